@@ -96,7 +96,7 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"rosrun kurumaisu map_server", topic="/map", stays=True),
         Step(r"rosrun kurumaisu map_saver"),
         End(r"rosrun kurumaisu map_server"),
-        Step(r"critic watch", topic="/diagnostics@critic"),
+        Step(r"critic watch", says="critic watch: "),
         Step(r"dynparam set /sim_node/live \"\{"),
         Step(r"rostopic echo -n 1 /sim_node/effects"),
         Step(r"dynparam set /sim_node/live base_lag_v_enabled false"),

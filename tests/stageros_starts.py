@@ -34,6 +34,7 @@ class RealTime(unittest.TestCase):
         code, said = node.stop()
         assert code == 0, said
         assert said.count("STAGEROS_NO_WINDOW") == 1
+        assert "for a page: roslaunch kurumaisu viewer.launch" in said
 
     def test_quit_time_ends_the_node(self):
         code, said = Stageros(ONE + "quit_time 3\n", "-g").wait()

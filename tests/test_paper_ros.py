@@ -48,6 +48,7 @@ def test_the_wall_through_driver_and_virtual_sensor_agrees_with_equation_4(tmp_p
     out = tmp_path / "out"
     assert main(["simulated-wall", "--out", str(out), "--settings", str(settings), "--speed", "4"]) == 0
     assert "off [se]" in capsys.readouterr().out
+    assert "has died" not in (out / "scans.log").read_text()  # roslaunch tells it in red, even of a node that was done
     with rosbag.Bag(out / "scans/place_5.bag") as bag:
         (connection, *_) = bag._get_connections("scan")
         assert connection.header["callerid"] in ("/laser_node", b"/laser_node")

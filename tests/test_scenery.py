@@ -17,6 +17,7 @@ position ( name "robot" pose [1 2 0 90] size [0.4 0.2 0.5] color "red" laser ( p
   model ( size [0.1 0.1 0.1] ) )
 model ( name "box" pose [3 0 0 0] size [1 0.5 1] )
 model ( name "long" pose [0 -3 0 0] size [8 0.1 1] )
+model ( name "part" pose [-1 -1 0 0] size [0.6 0.1 2.4] )
 model ( pose [5 5 0 0] size [0.2 0.2 1] mass 3 )
 """
 
@@ -37,10 +38,11 @@ def corners(piece, frame):
 
 def test_pieces_are_where_the_world_has_them(simulator):
     pieces = {piece.name: piece for piece in scenery(simulator.machinery)}
-    assert {name: piece.kind for name, piece in pieces.items() if piece.name in ("robot", "box", "long")} == {
+    assert {name: piece.kind for name, piece in pieces.items() if piece.name in ("robot", "box", "long", "part")} == {
         "robot": "robot",
         "box": "obstacle",
         "long": "wall",
+        "part": "wall",  # of a building, by its height
     }
     assert not pieces["long"].movable
     robot = pieces["robot"]

@@ -226,3 +226,27 @@ def test_completion_offers_what_a_user_starts(tmp_path):
     started = set(re.findall(r"rosrun kurumaisu ([\w-]+)", text))
     assert offered - CONFIGURATIONS - named == set()
     assert started - offered == set()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("sim.launch wrld:=a", "roslaunch: wrld:=a: sim.launch: no argument wrld; did you mean world?"),
+        ("round.launch bag:=b viewr:=true", "no argument viewr; did you mean viewer"),  # of the sim.launch inside
+        ("stageros.launch world:=a headless_rate:=1.0", ""),
+        ("experiment.launch experiment:=a bag:=b speed:=2 laser:=driver", ""),
+    ],
+)
+def test_a_mistyped_argument_ends_roslaunch(words, said):
+    command = ["roslaunch", "--dump-params", "kurumaisu", *words.split()]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert bool(done.stdout) != bool(said), done.stderr  # the exit code is 0 either way
+    assert said in done.stderr
+
+
+def test_arguments_of_other_launch_files_are_left_alone(tmp_path):
+    (tmp_path / "mine.launch").write_text(
+        '<launch><arg name="mine"/><include file="$(find kurumaisu)/launch/sim.launch"/></launch>'
+    )
+    command = ["roslaunch", "--dump-params", str(tmp_path / "mine.launch"), "mine:=1", "other:=1"]
+    subprocess.run(command, capture_output=True, check=True)

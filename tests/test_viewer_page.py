@@ -201,10 +201,31 @@ def test_a_robot_that_may_only_be_seen_looks_like_it(browser):
 
 def test_without_a_token_controls_say_how_to_get_one(browser, shown):
     with Visit(browser, shown.server.address) as visit:
-        expect(visit.page.locator("#banner")).to_contain_text("the link that the viewer printed")
+        expect(visit.page.locator("#banner")).to_contain_text("the link that the viewer printed at its start.")
+        expect(visit.page.locator("#banner-copy")).to_be_hidden()
         expect(visit.page.locator("#pause")).to_be_disabled()
         show_tab(visit.page, "effects")
         expect(visit.page.locator("[role=switch]").first).to_be_disabled()
+
+
+def test_the_command_that_lets_one_take_control_can_be_copied(browser, shown):
+    shown.hub.new_token, before = "rosservice call /viewer_node/new_token", shown.hub.new_token
+    try:
+        with Visit(browser, shown.server.address, permissions=["clipboard-read", "clipboard-write"]) as visit:
+            expect(visit.page.locator("#banner-command")).to_have_text(shown.hub.new_token)
+            visit.page.locator("#banner-copy").click()
+            expect(visit.page.locator("#toast")).to_have_text("The command was copied.")
+            assert visit.page.evaluate("navigator.clipboard.readText()") == shown.hub.new_token
+    finally:
+        shown.hub.new_token = before
+
+
+def test_odometry_does_not_look_like_a_reading_that_is_too_long():
+    odom = re.search(r"--odom: light-dark\(#(\w{6}), #(\w{6})\)", (PAGE / "style.css").read_text())
+    long = re.search(r"LONG = \{light: \[([\d, ]+)\], dark: \[([\d, ]+)\]\}", (PAGE / "picture/colors.js").read_text())
+    for one, other in zip(odom.groups(), long.groups(), strict=True):
+        pairs = zip(bytes.fromhex(one), map(int, other.split(",")), strict=True)
+        assert sum((a - b) ** 2 for a, b in pairs) > 70**2
 
 
 def test_a_recording_is_scrubbed(browser):

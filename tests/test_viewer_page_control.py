@@ -5,7 +5,8 @@ import math
 
 import pytest
 from playwright.sync_api import expect
-from viewer_page_rig import until
+from viewer_page_rig import LEGEND, until
+from viewer_rig import HALF
 
 BOX = (-1.0, 1.0)  # where the rig's box stands
 
@@ -30,8 +31,7 @@ def test_a_body_is_dragged_and_turned(visit, shown):
     until(lambda: near(poses["2"], 1.0, -1.0, 0.3), "the box is where it was put")
     expect(visit.page.locator("#body-select option:checked")).to_have_text("<b>box</b> (obstacle)")
     # the round handle stands before the box, 26 pixels from its corner
-    box = visit.page.locator("#front").bounding_box()
-    reach = math.hypot(0.25, 0.25) + 26 / (0.94 * min(box["width"], box["height"]) / 8)
+    reach = math.hypot(0.25, 0.25) + 26 / visit.scale()
     expect(visit.page.locator("#body-pose")).to_have_text("1.000 m, −1.000 m, 17.2°")
     drag(visit, (1.0 + reach * math.cos(0.3), -1.0 + reach * math.sin(0.3)), (1.0, 1.0))
     until(lambda: near(poses["2"], 1.0, -1.0, math.pi / 2), "the box is turned")
@@ -164,9 +164,46 @@ def test_a_body_is_placed_by_numbers(visit, shown):
     expect(page.locator("#toast")).to_have_text("<b>box</b> was moved there.")
 
 
+def test_the_form_follows_the_body_until_somebody_types(visit, shown):
+    page = visit.page
+    page.locator("#tab-body").click()
+    page.locator("#body-select").select_option(label="<b>box</b> (obstacle)")
+    shown.rig.poses["2"] = (0.75, 1.5, 0.0)
+    expect(page.locator("#place-x")).to_have_value("0.750")
+    page.locator("#place-y").fill("2")
+    shown.rig.poses["2"] = (1.0, 1.25, 0.0)
+    expect(page.locator("#body-pose")).to_have_text("1.000 m, 1.250 m, 0.0°")
+    expect(page.locator("#place-x")).to_have_value("0.750")
+    page.locator("#place button").click()
+    until(lambda: shown.rig.poses["2"][:2] == (0.75, 2.0), "placed")
+    shown.rig.poses["2"] = (-1.5, 1.25, 0.0)
+    expect(page.locator("#place-x")).to_have_value("-1.500")
+
+
+def test_the_seed_that_is_shown_is_that_of_the_run(visit, shown):
+    seed = visit.page.locator("#seed")
+    expect(seed).to_have_value("42")
+    seed.fill("7")
+    visit.page.locator("#reseed").click()
+    until(lambda: shown.rig.seed == 7, "started again")
+    expect(seed).to_have_value("7")
+    shown.rig.seed = 9  # somebody else's
+    expect(seed).to_have_value("9")
+
+
+def test_toolbar_and_legend_cover_nothing_at_first(visit):
+    bars = [visit.page.locator("[aria-label=View]").bounding_box(), visit.page.locator("#front").bounding_box()]
+    assert visit.spot(0, HALF)[1] > bars[0]["y"] + bars[0]["height"]
+    assert visit.spot(0, -HALF)[1] < bars[1]["y"] + bars[1]["height"] - LEGEND
+
+
 def test_recording_and_estimate(visit, shown):
     page = visit.page
+    shown.rig.slow.set()
     page.locator("#record").click()
+    expect(page.locator("#record")).to_have_text("Starting to record")
+    expect(page.locator("#record")).to_be_disabled()
+    shown.rig.slow.clear()
     expect(page.locator("#record")).to_have_text("Stop recording made_up.bag")
     expect(page.locator("#toast")).to_have_text("recording")
     page.locator("#estimate").click()

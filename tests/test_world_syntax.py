@@ -78,6 +78,11 @@ def test_language(tmp_path: Path, text: str | bytes, size: list[float] | None) -
         (b"position ( )\n\xef\xbb\xbf", "2:1: a byte order mark"),
         (b"position ( )\x0c", r"1:13: '\\x0c' is not allowed"),
         ("position = 3", "1:10: '=' is not allowed"),
+        ("model ( size[1 2 3] )", r"1:13: a blank is missing before '\[': size"),
+        ("position ( pose[0 0 0 0] size [1 1 1] )", r"1:16: a blank is missing before '\[': pose"),
+        ("model ( block ( points 3 point[0][1 2] ) )", r"1:34: a blank is missing before '\[': point\[0\]"),
+        ("model ( mass[5] )", r"1:9: mass\[5\] needs .*; if \[5\] is its value, a blank is missing"),
+        ('\n<?xml version="1.0"?>\n<sdf/>', "2:1: this is XML"),
     ],
 )
 def test_what_stage_refuses(tmp_path: Path, text: str | bytes, message: str) -> None:

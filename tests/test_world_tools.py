@@ -17,9 +17,10 @@ from shapely import geometry as shapely
 
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
+from kurumaisu.sim.robots.check_world import check_world
 from kurumaisu.world import load_world
 from kurumaisu.world.check import findings
-from kurumaisu.world.cli import check_world, export_world
+from kurumaisu.world.cli import export_world
 from kurumaisu.world.layout import beam_height
 from kurumaisu.world.model import Ranger
 from kurumaisu.world.occupancy import occupancy, rasterise
@@ -112,7 +113,7 @@ SURPRISES = {
         "slow laser",
     ),
     "has no laser, but": (WALL % ("1", "") + ROBOT % ("", LASER % "") + ROBOT % ("pose [0 2 0 0]", ""), "sensorless"),
-    "has the name of the robot at": (
+    "has the name r of the robot at": (
         WALL % ("1", "") + ROBOT % ('name "r"', LASER % "") + ROBOT % ('name "r" pose [0 2 0 0]', LASER % ""),
         "one name twice",
     ),
@@ -133,9 +134,62 @@ SURPRISES = {
 @pytest.mark.parametrize("message", SURPRISES, ids=lambda m: SURPRISES[m][1])
 def test_says_what_will_surprise(tmp_path, message):
     found = findings(read(tmp_path, SURPRISES[message][0]))
-    told = [str(finding) for finding in found if message in finding.message]
+    told = [str(finding) for finding in found if message in finding.words]
     assert len(told) == 1, found
     assert told[0].startswith(f"{tmp_path}/t.world:")
+
+
+def checked(folder: Path, capsys, text: str, *options: str):
+    (folder / "t.world").write_text(text)
+    code = check_world([str(folder / "t.world"), *options])
+    lines = capsys.readouterr().out.splitlines()
+    return code, [line.removeprefix(f"{folder}/t.world:") for line in lines[lines.index("") + 1 :]]
+
+
+def test_what_hurts_most_is_told_first_and_alike_things_once(tmp_path, capsys):
+    text = 'semantics "physical" threads 2\n' + WALL % ("1", "lase_return 1")
+    text += "".join(f'position ( name "r{i}" size [0.4 0.4 0.2] pose [0 {i} 0 0] {LASER % ""} )\n' for i in range(5))
+    text += ROBOT % ('name "in_wall" pose [2.8 0 0 0]', LASER % "")
+    code, lines = checked(tmp_path, capsys, text)
+    assert code == 3
+    assert lines == [
+        "2 surprises:",
+        "8:1: in_wall: touches something solid at its start",
+        "2:39: lase_return is not a property of a model: ignored, as Stage does",
+        "2 more with -v",
+    ]
+    code, more = checked(tmp_path, capsys, text, "-v")
+    assert code == 3
+    assert more[:3] == lines[:3]
+    assert more[-2].startswith("3:1: r0 ... r4 (5): is limited to 1 m/s")
+    assert more[-1] == "1:22: threads is accepted and has no effect here"
+
+
+def test_what_most_worlds_have_is_no_surprise(tmp_path, capsys):
+    text = "threads 2\nposition ( localization_origin [0 0 0 0] )\n"
+    assert checked(tmp_path, capsys, text) == (0, ["no surprises", "3 more with -v"])  # and no walls
+    assert checked(tmp_path, capsys, text, "-v")[0] == 0
+    assert checked(tmp_path, capsys, "") == (0, ["no surprises"])
+
+
+def test_an_unnamed_robot_and_one_of_its_name_are_twins(tmp_path):
+    world = read(
+        tmp_path, WALL % ("1", "") + ROBOT % ("", LASER % "") + ROBOT % ('name "robot_0" pose [0 2 0 0]', LASER % "")
+    )
+    (twin,) = findings(world)
+    assert "has the name robot_0" in twin.words
+
+
+def test_says_where_cells_matter(tmp_path, capsys):
+    sides = "".join(f"model ( pose [4 {y} 0 0] size [12 0.3 1] )\n" for y in (-0.75, 0.75))
+    coarse = "resolution 0.2\n" + sides + ROBOT % ("", LASER % "")  # a corridor, where most beams graze a wall
+    code, lines = checked(tmp_path, capsys, coarse)
+    assert code == 3
+    assert re.fullmatch(
+        r"1:1: lasers: from the start poses \d+ % of the beams .* 0\.4 m .*ray_casting: cells .*", lines[1]
+    )
+    assert checked(tmp_path, capsys, 'semantics "physical"\n' + coarse)[0] == 0
+    assert checked(tmp_path, capsys, coarse.replace("0.2", "0.01", 1))[0] == 0
 
 
 def test_says_nothing_of_a_world_without_surprises(tmp_path):

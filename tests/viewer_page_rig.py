@@ -22,6 +22,7 @@ from kurumaisu.viewer import Body, Fan, Group, Hub, Note, Outcome, PlaybackState
 HOSTILE = "<img src=x onerror=alert(1)>"
 BAG = frozenset({"seek", "play", "rate"})
 LONG = 60.0  # [s] of the recording
+TOOLBAR, LEGEND = 44, 80  # [px] that they cover of the picture
 PERIOD = 1 / 30  # [s] between frames
 
 
@@ -200,9 +201,14 @@ class Visit:
 
     def spot(self, x, y):
         """Return where a point of the world is in the picture when all of it is shown: pixels from its corner."""
+        box, scale = self.page.locator("#front").bounding_box(), self.scale()
+        middle = box["height"] / 2 + (TOOLBAR - LEGEND) / 2
+        return box["x"] + box["width"] / 2 + x * scale, box["y"] + middle - y * scale
+
+    def scale(self):
+        """Return how many pixels a metre has when all of the world is shown, between toolbar and legend."""
         box = self.page.locator("#front").bounding_box()
-        scale = 0.94 * min(box["width"], box["height"]) / (2 * HALF)
-        return box["x"] + box["width"] / 2 + x * scale, box["y"] + box["height"] / 2 - y * scale
+        return 0.94 * min(box["width"], box["height"] - TOOLBAR - LEGEND) / (2 * HALF)
 
     def __enter__(self):
         return self

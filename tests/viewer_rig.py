@@ -82,6 +82,7 @@ class Rig:
         self.paused, self.estop, self.t = False, False, 0.0
         self.recording: str | None = None
         self.speed = 1.0
+        self.seed = 42
         self.slow = threading.Event()  # set: commands but drive and estop wait until it is cleared
         self.poses = {"0": (0.0, 0.0, 0.0), "1": (RADIUS, 0.0, math.pi / 2), "2": (-1.0, 1.0, 0.3)}
         self.effects = {"laser.offset": (False, 0.0), "laser.noise": (False, 0.01)}
@@ -110,6 +111,10 @@ class Rig:
     def do_speed(self, value):
         self.speed = value
         return Outcome(f"{value:g} times as fast")
+
+    def do_seed(self, value):
+        self.seed = value
+        return self.do_reset()
 
     def do_reset(self):
         self.t = 0.0
@@ -176,6 +181,7 @@ class Rig:
             volts=(0.5, 0.2),
             estop=self.estop,
             recording=self.recording,
+            seed=self.seed,
             notes=(Note("warning", "MADE_UP <script>alert(1)</script>"),),
         )
         self.hub.state(state, {(CHAIR, 0): fan})

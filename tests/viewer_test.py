@@ -135,7 +135,7 @@ class ViewerTest(unittest.TestCase):
         self.do("set_pose", body=self.body("wall"), x=-4.0, y=1.0, yaw=0.0)  # stands: others are built around it
         assert self.pose("wall", lambda pose: pose[0] < -3.5) == pytest.approx([-4.0, 1.0, 0.0], abs=1e-3)
         refusal = self.refused("set_pose", body=self.body("chair"), x=-4.0, y=1.0, yaw=0.0)
-        assert refusal.startswith("chair: does not fit")  # by its name, not by its id
+        assert refusal == "chair: does not fit at x -4.000 m, y 1.000 m, 0.0 deg; in the way: wall"  # by names, not ids
         assert "no body" in self.refused("set_pose", body="moon", x=0.0, y=0.0, yaw=0.0)
         assert "position.x: must be" in self.refused("set_pose", body=self.body("box"), x=1e300, y=0.0, yaw=0.0)
         self.page.send(
@@ -207,6 +207,7 @@ class ViewerTest(unittest.TestCase):
         self.do("reset")
         assert self.pose("chair", lambda pose: pose[1] < 1) == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
         self.do("seed", value=9)
+        self.page.state(lambda state: state["seed"] == 9, "the seed of the run")
         assert "integer" in self.refused("seed", value=-1)
 
     def test_record(self):

@@ -60,7 +60,7 @@ def picture(grid: Grid, trajectory: FloatArray, other: FloatArray | None = None,
     axes.plot(*trajectory[0, 1:3], "o", color="tab:green", label="start")
     axes.plot(*trajectory[-1, 1:3], "s", color="tab:red", label="end")
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal", xlim=(left, right), ylim=(bottom, top))
-    axes.legend(loc="upper right", framealpha=0.9)
+    axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, frameon=False)  # above the map, not on it
     drawn = BytesIO()
     figure.savefig(drawn, dpi=130, format="png")
     return drawn.getvalue()

@@ -14,6 +14,8 @@ from kurumaisu.bench.table import MarkdownTable
 from kurumaisu.experiments import Script, names, nominal_path, shipped_script
 from kurumaisu.whole_files import write_whole
 
+_COLUMNS = 4
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table; draw the paths into a file if one is given."""
@@ -27,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         box = f"box {b.ahead:g} x {b.behind:g} x {b.left:g} x {b.right:g}"
         table.row(f"`{script.name}`", f"{_what(script)}; {box}", f"{script.seconds:.0f}", script.good_for)
     if options.picture is not None:
-        _draw([script for script in scripts if script.kind == "drive"], options.picture)
+        _draw(scripts, options.picture)
     return 0
 
 
@@ -48,18 +50,25 @@ def _draw(scripts: Sequence[Script], path: Path) -> None:
     from matplotlib import pyplot
 
     mpl.rcParams.update({"svg.hashsalt": "experiments", "font.size": 8})
-    figure, axes = pyplot.subplots(3, 4, figsize=(10, 6.5), layout="constrained")
+    rows = -(-len(scripts) // _COLUMNS)
+    figure, axes = pyplot.subplots(
+        rows, _COLUMNS, figsize=(10, 1.7 * rows + 0.5), layout="constrained", sharex=True, sharey=True
+    )
     for axis in axes.flat[len(scripts) :]:
         axis.set_axis_off()
     for axis, script in zip(axes.flat, scripts, strict=False):
-        poses, b = nominal_path(script.phases), script.box
+        b = script.box
         corners = np.array([(b.ahead, b.left), (-b.behind, b.left), (-b.behind, -b.right), (b.ahead, -b.right)])
         axis.fill(*corners.T, facecolor="0.93", edgecolor="0.6")
-        axis.plot(*poses[:, :2].T, color="tab:blue")
+        if script.kind == "drive":
+            axis.plot(*nominal_path(script.phases)[:, :2].T, color="tab:blue")
+        elif script.kind == "places":
+            axis.plot(*np.array([place.pose[:2] for place in script.places]).T, "x", color="tab:blue")
         axis.plot(0, 0, "o", color="tab:red", markersize=3)
         axis.set_title(f"{script.name}, {script.seconds:.0f} s")
         axis.set_aspect("equal")
-    figure.supxlabel("x [m] ahead of the start; grey: the box")
+    figure.supxlabel("x [m] ahead of the start (red), all on one scale; grey: the box; crosses: places to stand at")
+    figure.supylabel("y [m] to the left")
     drawn = io.StringIO()
     figure.savefig(drawn, format="svg", metadata={"Date": None})
     write_whole({path: drawn.getvalue()})

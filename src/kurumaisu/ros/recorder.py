@@ -90,7 +90,7 @@ class Recorder:
     def _wait_until_heard(self, topics: Sequence[str], node: str) -> None:
         deadline = time.monotonic() + _PATIENCE
         while self._process.poll() is None and time.monotonic() < deadline:
-            if _connected(node) >= {topic for topic in topics if publishers(topic)}:
+            if connected(node) >= {topic for topic in topics if publishers(topic)}:
                 return
             time.sleep(_GLANCE)
         self._process.kill()
@@ -98,7 +98,7 @@ class Recorder:
         raise Error(f"{self._path}: rosbag record does not start")
 
 
-def _connected(node: str) -> set[str]:
+def connected(node: str) -> set[str]:
     """Return the topics from which a node receives; the master knows only what it asked for."""
     try:
         uri = rosgraph.Master(rospy.get_name()).lookupNode(node)

@@ -261,7 +261,14 @@ class Client:
         source = self._source
         abilities = tuple(sorted(source.abilities)) if self._keys is not None else ()
         return protocol.Hello(
-            source.title, source.mode, self._control, abilities, source.limits, session, self._hub.report
+            source.title,
+            source.mode,
+            self._control,
+            abilities,
+            source.limits,
+            session,
+            self._hub.report,
+            self._hub.new_token,
         )
 
 

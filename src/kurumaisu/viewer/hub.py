@@ -60,6 +60,7 @@ class Hub:
         self.maps: dict[int, bytes] = {}  # PNG files by number
         self.dropped = 0  # messages that clients who have gone lost
         self.report: str | None = None  # address of the critic's report, if there is one
+        self.new_token: str | None = None  # command that prints an address with a token, if there is one
 
     def world(self, world: protocol.World) -> None:
         """Show other bodies; their scans are to come."""

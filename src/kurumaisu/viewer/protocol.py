@@ -41,6 +41,7 @@ class Hello:
     limits: Mapping[str, float] | None
     session: str | None = None  # only after a token
     report: str | None = None  # address of the critic's report, if there is one
+    new_token: str | None = None  # command that prints an address with a token
     version: int = VERSION
 
 
@@ -121,7 +122,7 @@ class State:
     rtf: simulated seconds per second, speed: those that are wanted, 0: as many as possible; hit: bodies that something
     keeps from moving; contacts: how often that has begun, by body, so that none between two moments is missed; odom:
     in the world's frame; v [m/s], w [rad/s]: as they are; commanded: as asked for; volts: forward and steering, from
-    neutral [V].
+    neutral [V]; starting: a bag was begun that receives nothing yet; seed: of this run.
     """
 
     t: float
@@ -141,6 +142,8 @@ class State:
     volts: tuple[float, float] | None = None
     estop: bool | None = None
     recording: str | None = None
+    starting: bool = False
+    seed: int | None = None
     notes: tuple[Note, ...] = ()
     playback: PlaybackState | None = None
     driver: str | None = None  # the input that drives

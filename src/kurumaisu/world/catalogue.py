@@ -61,6 +61,8 @@ _ACCEPTED: dict[str, set[str]] = {
     "blinkenlight": {"period", "dutycycle", "enabled"},
 }
 
+_MISSED = ("ctrl",)  # of these, what a robot does not move without
+
 # Without an effect in Stage 4 either, and well known from old files: silence.
 _DEAD: dict[str, set[str]] = {
     "world": {
@@ -109,7 +111,7 @@ def _check_type(entity: Entity, parent: Entity, notes: Notes) -> None:
     if kind in MODELS and parent.type not in (*MODELS, "world"):
         notes.add(entity.name, f"a {kind} in a {parent.type} stands on the ground, as in Stage")
     if kind in _BODY_ONLY:
-        notes.add(entity.name, f"{kind}: only its body is simulated here", kind)
+        notes.add(entity.name, f"{kind}: only its body is simulated here", kind, routine=True)
 
 
 def _article(kind: str) -> str:
@@ -127,7 +129,8 @@ def _check_properties(entity: Entity, notes: Notes) -> None:
         if trap:
             notes.add(given.name, f"{name} has no effect: {trap}", f"{entity.type} {name}")
         elif any(name in _ACCEPTED.get(kind, ()) for kind in kinds):
-            notes.add(given.name, f"{name} is accepted and has no effect here", name)
+            text = f"{name} is accepted and has no effect here"
+            notes.add(given.name, text, name, routine=name not in _MISSED)
         elif not any(name in _DEAD.get(kind, ()) for kind in kinds):
             text = f"{name} is not a property of {_article(entity.type)}: ignored, as Stage does"
             notes.add(given.name, text, f"{entity.type} {name}")

@@ -5,31 +5,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu._core import Arena
+from kurumaisu.world.findings import Finding
 from kurumaisu.world.layout import beam_height, outline, travels
-from kurumaisu.world.model import Model, Place, Position, Ranger
+from kurumaisu.world.model import Model, Position, Ranger
 from kurumaisu.world.world import World
 
 
-@dataclass(frozen=True)
-class Finding:
-    """Something that may not be what its author meant."""
-
-    place: Place
-    message: str
-
-    def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
-
-
 def findings(world: World) -> tuple[Finding, ...]:
-    """Return what the world says and its author may not mean, by place in its files."""
-    found = [finding for rule in _RULES for finding in rule(world)]
-    return tuple(sorted(found, key=lambda finding: (str(finding.place.file), finding.place.line, finding.place.column)))
+    """Return what the world says and its author may not mean: what hurts most first, then by place in its files."""
+    return tuple(finding for rule in _RULES for finding in sorted(rule(world), key=_in_file))
+
+
+def _in_file(finding: Finding) -> tuple[bool, str, int, int]:
+    place = finding.place
+    return finding.routine, str(place.file), place.line, place.column
 
 
 def _beams(world: World) -> Iterator[Finding]:
@@ -46,7 +39,8 @@ def _beams(world: World) -> Iterator[Finding]:
             z = beam_height(model, world.poses[model.index], fan)
             if not ((spans[:, 0] <= z) & (z <= spans[:, 1])).any():
                 where = "above" if z > spans[:, 1].max() else "below" if z < spans[:, 0].min() else "between"
-                yield Finding(fan.place, f"the beams, {z:.2f} m above the ground, pass {where} all walls")
+                words = f"its beams, {z:.2f} m above the ground, pass {where} all walls"
+                yield Finding(fan.place, _name(model), words)
 
 
 def _thin(world: World) -> Iterator[Finding]:
@@ -58,7 +52,8 @@ def _thin(world: World) -> Iterator[Finding]:
         if extent.min() < world.resolution and model.type == "model":
             yield Finding(
                 model.place,
-                f"{_name(model)} is {1000 * extent.min():.0f} mm thin, less than the resolution of "
+                _name(model),
+                f"is {1000 * extent.min():.0f} mm thin, less than the resolution of "
                 f"{1000 * world.resolution:.0f} mm: Stage may ignore it; here it is solid",
             )
 
@@ -82,29 +77,31 @@ def _in_walls(world: World) -> Iterator[Finding]:
     if bodies:
         for body, touches in zip(bodies, arena.touches(np.array(list(bodies))), strict=True):
             if touches:
-                yield Finding(bodies[body].place, f"{_name(bodies[body])} touches something solid at its start")
+                yield Finding(bodies[body].place, _name(bodies[body]), "touches something solid at its start")
 
 
 def _speed(world: World) -> Iterator[Finding]:
     stage = np.array([[-1, 1]] * 3 + [[-math.pi / 2, math.pi / 2]])
     for model, position in _positions(world):
         if np.allclose(position.velocity_bounds, stage):
-            yield Finding(
-                model.place, f"{_name(model)} is limited to 1 m/s and 90 deg/s, because it has no velocity_bounds"
-            )
+            words = "is limited to 1 m/s and 90 deg/s, because it has no velocity_bounds"
+            yield Finding(model.place, _name(model), words, routine=True)
 
 
 def _localization(world: World) -> Iterator[Finding]:
     for model, position in _positions(world):
         if position.localization == "gps":
             for name in ("odom_error", "localization_origin"):
-                if getattr(position, name) is not None:
-                    yield Finding(model.place, f'{_name(model)}: {name} has no effect with localization "gps"')
+                values = getattr(position, name)
+                if values is not None:
+                    words = f'{name} has no effect with localization "gps"'
+                    yield Finding(model.place, _name(model), words, routine=not values.any())
         elif model.update_interval > world.interval:
             share = world.interval / model.update_interval
             yield Finding(
                 model.place,
-                f"{_name(model)}: odometry adds up only {100 * share:.0f} % of the distance, as in Stage, because "
+                _name(model),
+                f"odometry adds up only {100 * share:.0f} % of the distance, as in Stage, because "
                 "update_interval is longer than interval_sim",
             )
 
@@ -115,21 +112,21 @@ def _sensorless(world: World) -> Iterator[Finding]:
         return
     for robot in robots:
         if not any(isinstance(other.device, Ranger) and other.parent == robot.index for other in world.models):
-            yield Finding(
-                robot.place, f"{_name(robot)} has no laser, but as a position counts as a robot in topic names"
-            )
+            words = "has no laser, but as a position counts as a robot in topic names"
+            yield Finding(robot.place, _name(robot), words)
 
 
 def _twins(world: World) -> Iterator[Finding]:
     first: dict[str, Model] = {}
-    for robot, _ in _positions(world):
-        twin = first.setdefault(robot.name, robot) if robot.name else robot
+    for number, (robot, _) in enumerate(_positions(world)):
+        prefix = robot.name or f"robot_{number}"  # as stageros -u calls it
+        twin = first.setdefault(prefix, robot)
         if twin is not robot:
-            yield Finding(
-                robot.place,
-                f"{_name(robot)} has the name of the robot at {twin.place}: with -u stageros refuses it, because their "
-                "topics and frames would be the same",
+            words = (
+                f"has the name {prefix} of the robot at {twin.place}: with -u stageros refuses it, because their "
+                "topics and frames would be the same"
             )
+            yield Finding(robot.place, _name(robot), words)
 
 
 def _rangers(world: World) -> Iterator[Finding]:
@@ -138,18 +135,19 @@ def _rangers(world: World) -> Iterator[Finding]:
             continue
         fans = model.device.fans
         if len(fans) > 1:
-            yield Finding(
-                model.place, f"{_name(model)} has {len(fans)} sensors; stage_ros publishes the first one only"
-            )
+            words = f"has {len(fans)} sensors; stage_ros publishes the first one only"
+            yield Finding(model.place, _name(model), words)
         if model.update_interval > world.interval:
             yield Finding(
                 model.place,
-                f"{_name(model)} is updated every {model.update_interval:g} s, the world every {world.interval:g} s: "
+                _name(model),
+                f"is updated every {model.update_interval:g} s, the world every {world.interval:g} s: "
                 "the same scan is published again in between",
             )
         for fan in fans:
             if fan.samples > 1 and math.isclose(fan.fov, 2 * math.pi):
-                yield Finding(fan.place, "with fov 360 the first and the last beam are the same")
+                words = "with fov 360 the first and the last beam are the same"
+                yield Finding(fan.place, _name(model), words, routine=True)
 
 
 def _intangible(world: World) -> Iterator[Finding]:
@@ -157,11 +155,11 @@ def _intangible(world: World) -> Iterator[Finding]:
         if travels(model, world.models) or not len(model.shape.segments):
             continue
         if model.ranger_return < 0 and model.obstacle_return:
-            yield Finding(model.place, f"{_name(model)} stops robots but lasers do not see it (ranger_return below 0)")
+            words = "stops robots but lasers do not see it (ranger_return below 0)"
+            yield Finding(model.place, _name(model), words)
         if model.ranger_return >= 0 and not model.obstacle_return and model.slope is None:
-            yield Finding(
-                model.place, f"{_name(model)} is seen by lasers but robots drive through it (obstacle_return 0)"
-            )
+            words = "is seen by lasers but robots drive through it (obstacle_return 0)"
+            yield Finding(model.place, _name(model), words)
 
 
 def _slopes(world: World) -> Iterator[Finding]:
@@ -171,14 +169,14 @@ def _slopes(world: World) -> Iterator[Finding]:
         if model.slope is None:
             continue
         if travels(model, world.models) or model.mass > 0 or model.hinge is not None:
-            yield Finding(model.place, f"{_name(model)}: slope has no effect on what can move")
+            yield Finding(model.place, _name(model), "slope has no effect on what can move")
         if model.obstacle_return:
-            yield Finding(model.place, f"{_name(model)} has a slope, but stops robots: it needs obstacle_return 0")
+            words = "has a slope, but stops robots: it needs obstacle_return 0"
+            yield Finding(model.place, _name(model), words)
         low, high = (model.shape.heights + world.poses[model.index, 2]).T
         if model.ranger_return >= 0 and any(((low <= z) & (z <= high)).any() for z in beams):
-            yield Finding(
-                model.place, f"{_name(model)} has a slope, but is a wall to lasers: it needs ranger_return -1"
-            )
+            words = "has a slope, but is a wall to lasers: it needs ranger_return -1"
+            yield Finding(model.place, _name(model), words)
 
 
 def _own_tree(world: World) -> Iterator[Finding]:
@@ -186,7 +184,8 @@ def _own_tree(world: World) -> Iterator[Finding]:
         if model.root != model.index and not isinstance(world.models[model.root].device, Position):
             yield Finding(
                 model.place,
-                f"{_name(model)} stands inside {_name(world.models[model.root])}: its lasers do not see it, "
+                _name(model),
+                f"stands inside {_name(world.models[model.root])}: its lasers do not see it, "
                 "and it does not collide with it",
             )
 
@@ -202,15 +201,15 @@ def _name(model: Model) -> str:
 
 
 _RULES: tuple[Callable[[World], Iterator[Finding]], ...] = (
-    _beams,
-    _thin,
     _in_walls,
-    _speed,
-    _localization,
-    _sensorless,
-    _twins,
-    _rangers,
-    _intangible,
-    _slopes,
     _own_tree,
+    _beams,
+    _intangible,
+    _twins,
+    _sensorless,
+    _localization,
+    _slopes,
+    _rangers,
+    _thin,
+    _speed,
 )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The commands check-world and export-world."""
+"""The command export-world, and the world that it and check-world are given."""
 
 from __future__ import annotations
 
@@ -11,35 +11,10 @@ from kurumaisu import program
 from kurumaisu.errors import Error
 from kurumaisu.maps import grid_pair
 from kurumaisu.whole_files import write_whole
-from kurumaisu.world.check import findings
-from kurumaisu.world.contents import contents
 from kurumaisu.world.drawing import to_svg
 from kurumaisu.world.files import parse_values
 from kurumaisu.world.occupancy import occupancy
 from kurumaisu.world.world import World, load_world
-
-_SURPRISES = 3  # exit code; 1 is an error, 2 a wrong command line, as everywhere
-
-
-def check_world(arguments: list[str] | None = None) -> int:
-    """Say what a world contains and what in it will surprise. Return 0, 3 with findings, 1 for a bad file."""
-    parser = program.Parser(
-        prog="check-world",
-        description="Show what a world file contains, and what in it may surprise.",
-        epilog="Exit code: 0 no surprises, 3 some, 1 a bad file, 2 wrong usage.",
-    )
-    _add_world(parser)
-    options = parser.parse_args(arguments)
-    try:
-        world = _load(options)
-    except Error as error:
-        print(f"check-world: {error}", file=sys.stderr)
-        return 1
-    print("\n".join(contents(world)))
-    surprises = list(dict.fromkeys([*world.warnings, *map(str, findings(world))]))  # a macro's are the same each time
-    count = f"{len(surprises)} surprise{'s' if len(surprises) > 1 else ''}:" if surprises else "no surprises"
-    print("\n".join(["", count, *surprises]))
-    return _SURPRISES if surprises else 0
 
 
 def export_world(arguments: list[str] | None = None) -> int:
@@ -47,7 +22,7 @@ def export_world(arguments: list[str] | None = None) -> int:
     parser = program.Parser(
         prog="export-world", description="Write a world as a map_server pair (NAME.pgm, NAME.yaml) and as NAME.svg."
     )
-    _add_world(parser)
+    add_world(parser)
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", default=Path(), help="folder to write into (.)")
     parser.add_argument(
         "--resolution", type=float, default=0.05, metavar="M", help="size of the map's cells [m] (0.05)"
@@ -62,7 +37,7 @@ def export_world(arguments: list[str] | None = None) -> int:
     if not 1e-3 <= options.resolution <= 10:
         parser.error(f"--resolution: must be 0.001 to 10 m: {options.resolution:g}")
     try:
-        world = _load(options)
+        world = load(options)
         options.output.mkdir(parents=True, exist_ok=True)
         path = options.output / options.world.stem
         grid = occupancy(world, options.resolution, options.height)
@@ -76,7 +51,8 @@ def export_world(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def _add_world(parser: argparse.ArgumentParser) -> None:
+def add_world(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that say which world."""
     parser.add_argument("world", type=Path, metavar="FILE", help="a Stage world, or a map_server YAML")
     parser.add_argument(
         "--image-extents",
@@ -88,7 +64,8 @@ def _add_world(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _load(options: argparse.Namespace) -> World:
+def load(options: argparse.Namespace) -> World:
+    """Return the world that the arguments say. Raise Error naming file, line and column."""
     return load_world(options.world, image_extents=options.image_extents, values=dict(options.values))
 
 

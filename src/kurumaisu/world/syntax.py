@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ _DEEPEST = 100  # levels of entities in entities, and of macros of macros
 _MOST_STEPS = 2_000_000  # properties and entities read; the largest world of Stage's own comes to some ten thousand
 
 _VALUES = (Kind.NUMBER, Kind.STRING)
+_INDEXED = re.compile(r"[^\[\]]*(\[\d+\])?")  # how brackets in a word are meant: point[0]
 
 
 @dataclass(frozen=True)
@@ -91,7 +93,7 @@ class _Parser:
             if token.kind is Kind.LINE_END:
                 at += 1
             elif token.kind is not Kind.WORD:
-                raise token.error(f"expected a property or an entity, not {token}")
+                raise self._unexpected(at)
             elif token.text == "define":
                 at = self._define(at)
             else:
@@ -151,11 +153,28 @@ class _Parser:
             return self._tuple(entity, word, following + 1)
         raise self._no_value(word, self._tokens[at + 1])
 
+    def _unexpected(self, at: int) -> Exception:
+        """Return the error of a token that begins nothing: a word before it on its line may have eaten a bracket."""
+        token = self._tokens[at]
+        while at > 0 and self._tokens[at - 1].kind not in (Kind.LINE_END, Kind.CLOSE, Kind.OPEN):
+            at -= 1
+            if self._tokens[at].kind is Kind.WORD and not _INDEXED.fullmatch(self._tokens[at].text):
+                return self._no_blank(self._tokens[at])
+        return token.error(f"expected a property or an entity, not {token}")
+
+    def _no_blank(self, word: Token) -> Exception:
+        ends = word.text.rfind("[")
+        return word.source.error(word.at + ends, f"a blank is missing before '[': {word.text[:ends]} [...]")
+
     def _no_value(self, word: Token, found: Token) -> Exception:
+        if not _INDEXED.fullmatch(word.text):
+            return self._no_blank(word)
         before = word.source.text[word.at - 1 : word.at]
         if before.isdigit() and word.text[0] in "eE":
             return word.error(f"numbers have no exponent in Stage's language: {before}{word.text}")
-        return word.error(f"{word.text} needs a value on its line, or '(', not {found}")
+        index = word.text[word.text.find("[") :] if word.text.endswith("]") else ""
+        hint = f"; if {index} is its value, a blank is missing before it" if index else ""
+        return word.error(f"{word.text} needs a value on its line, or '(', not {found}{hint}")
 
     def _child(self, parent: Entity, word: Token, at: int, depth: int) -> int:
         """Read an entity whose opening bracket is just behind."""
@@ -181,7 +200,7 @@ class _Parser:
             elif kind is Kind.END:
                 raise entity.name.error(f"the '(' of {entity.name.text} is never closed")
             else:
-                raise tokens[at].error(f"expected a property or an entity, not {tokens[at]}")
+                raise self._unexpected(at)
 
     def _second_bracket(self, entity: Entity, bracket: Token) -> Entity:
         """Return the entity that a '(' without a name before it begins: as in Stage, another one of the same type.

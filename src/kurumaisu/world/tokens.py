@@ -131,6 +131,8 @@ def _not_a_token(source: SourceText, at: int) -> Error:
         return source.error(at, "a string is not closed on its line")
     if character == "\ufeff":
         return source.error(at, "a byte order mark is not allowed: save the file without it")
+    if character == "<" and not source.text[:at].strip():
+        return source.error(at, "this is XML (SDF, URDF, a launch file?), not a Stage world")
     if 0xDC80 <= ord(character) <= 0xDCFF:
         return source.error(at, f"byte 0x{ord(character) - 0xDC00:02x} is not allowed outside of comments and strings")
     return source.error(at, f"{character!r} is not allowed")

@@ -54,7 +54,8 @@ class World:
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
     that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
-    warnings: what the file says and this reader does not heed, in words.
+    warnings: what the file says and this reader does not heed, in words; routine: those of them that most files give
+    rise to.
     """
 
     name: str
@@ -71,6 +72,7 @@ class World:
     obstacles: FloatArray
     starts: tuple[Start, ...]
     warnings: tuple[str, ...]
+    routine: frozenset[str]
 
     @property
     def start(self) -> FloatArray:
@@ -170,6 +172,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
         starts=tuple(Start(m.name or "chair", poses[m.index, PLANAR]) for m in starts),
         warnings=tuple(said.notes.texts),
+        routine=frozenset(said.notes.routine),
     )
 
 

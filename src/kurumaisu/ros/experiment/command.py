@@ -16,7 +16,7 @@ from kurumaisu.errors import Error, one_line
 from kurumaisu.experiments import Script, load_script, names, shipped_script
 from kurumaisu.experiments.supervisor import read_care
 from kurumaisu.params import load_model, shipped
-from kurumaisu.ros import life
+from kurumaisu.ros import life, parent_launch
 from kurumaisu.ros.experiment.drive import run_drive
 from kurumaisu.ros.experiment.places import run_places
 from kurumaisu.ros.experiment.surroundings import ExperimentSpace
@@ -57,7 +57,8 @@ def _tell(script: Script, options: argparse.Namespace, own: life.Life) -> int:
         why = one_line(error)
     if why:
         return _stopped(options.name, why)
-    print(f"experiment: {options.name}: done, {script.seconds:.0f} s{_hint(options.bag)}")
+    words = f"experiment: {options.name}: done, {script.seconds:.0f} s{_hint(options.bag)}"
+    parent_launch.done(words, options.ends_launch, own.asked)
     return 0
 
 
@@ -91,4 +92,5 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--world", help="world file to check for space, or none (default: the simulator's)")
     parser.add_argument("--model", type=Path, default=shipped("launch/md100.yaml"), help="model file of the chair")
     parser.add_argument("--settings", type=Path, default=shipped("launch/experiment_node.yaml"))
+    parent_launch.add_option(parser)
     return parser

@@ -94,7 +94,12 @@ class SimNode:
         self._services = Services(self, self._requests, self._pacer, settings.states, "")
         self._fan = ChairFan(settings.model.laser, lambda: self._simulator.row)
         self._view = ViewTopics(
-            settings.view_rate, settings.map_frame, lambda: self._simulator.machinery, self._fan, self._drives
+            settings.view_rate,
+            settings.map_frame,
+            lambda: self._simulator.machinery,
+            self._fan,
+            self._drives,
+            lambda: self._seed,
         )
         self._effects = LiveEffects(settings.model.effects, self._switch)
 
@@ -154,6 +159,7 @@ class SimNode:
     def load(self, saved: bytes) -> None:
         """Go back to a state of this world; /clock runs on, and the voltages are neutral until new ones come."""
         self._start(self._simulator.load(saved))
+        self._seed = self._simulator.seed
 
     def _start(self, observation: Observation) -> None:
         """Go on from an observation, at what the clock says now."""

@@ -114,7 +114,10 @@ def _speed(world: World, settings: StagerosSettings, headless: bool) -> float:
         raise Error(
             f"headless_rate: {settings.headless_rate:g}: works only with -g; otherwise the world's speedup is used"
         )
-    rospy.logwarn("STAGEROS_NO_WINDOW without -g the world runs at its speedup, but this program has no window")
+    rospy.logwarn(
+        "STAGEROS_NO_WINDOW without -g the world runs at its speedup, but this program has no window; for a page: "
+        "roslaunch kurumaisu viewer.launch simulator:=stageros base:=none drive:=cmd_vel control:=true"
+    )
     return max(world.speedup, 0.0)
 
 

@@ -65,6 +65,7 @@ class Session:
             lambda: self._simulator.machinery,
             self._fans,
             self._drives,
+            lambda: self._seed,
         )
         self.heard = 0  # commands and poses, of any robot, since the start, dropped ones included
 
@@ -179,6 +180,7 @@ class Session:
         if len(set(prefixes)) != len(self._simulator.robots):
             self._simulator.load(now)
             raise Error(f"state: does not name each of its robots once: {told(prefixes)}")
+        self._seed = self._simulator.seed
         switches = self._settings.strip_leading_slash, self._settings.relative_topics
         self._numbered = max(self._numbered, numbered)
         self._take([Names(prefix, *switches) for prefix in prefixes])

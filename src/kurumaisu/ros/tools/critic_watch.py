@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import threading
 import time
 from collections.abc import Sequence
@@ -54,9 +55,10 @@ _LEVELS = {
     "unknown": DiagnosticStatus.WARN,
     "invalid_data": DiagnosticStatus.ERROR,
 }
+_COUNT = re.compile(r"[\d.]+ (s|Hz)")  # what changes without anything having happened
 _DESCRIPTION = """\
 Listen to a running robot, criticise the last minutes repeatedly in a separate
-process, and publish the verdict. Ends with ROS or Ctrl-C."""
+process; print and publish the verdict. Ends with ROS or Ctrl-C."""
 _EPILOG = """\
 subscribes to:
   cmd_vel, voltages, ground_truth, odom, scan, battery, temperature
@@ -86,6 +88,7 @@ class CriticWatch:
         self._last = WatchedCriticism(None, "nothing has been criticised yet")
         self._answered: float | None = None  # ROS time [s]
         self._number = 0
+        self._told: object = None
         self._problems: tuple[str, ...] = ()
         self._publisher = rospy.Publisher("diagnostics", DiagnosticArray, queue_size=1)
         self._subscribers = [
@@ -149,6 +152,7 @@ class CriticWatch:
         missing = _missing(topics)
         verdict = self._last.verdict
         level = DiagnosticStatus.WARN if verdict is None else _LEVELS[verdict.verdict]
+        self._tell(missing)
         values = {"verdict": "" if verdict is None else verdict.verdict, "criticisms": str(self._number)}
         values["age [s]"] = "" if self._answered is None else f"{now - self._answered:.1f}"
         values["under way"] = "yes" if self._rolling.busy else "no"
@@ -168,6 +172,15 @@ class CriticWatch:
         message = DiagnosticArray(status=[status])
         message.header.stamp = rospy.get_rostime()
         self._publisher.publish(message)
+
+    def _tell(self, missing: str) -> None:
+        """Print each answer, and what is missing when that is something else."""
+        told = self._number, self._last.headline, _COUNT.sub("", missing)
+        if told == self._told:
+            return
+        self._told = told
+        count = f"criticism {self._number}: " if self._number else ""
+        print(f"critic watch: {time.strftime('%H:%M:%S')} {count}{missing}{self._last.headline}", flush=True)
 
 
 def _fares(heard: Heard, now: float) -> tuple[bool, str]:

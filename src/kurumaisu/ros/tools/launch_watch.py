@@ -13,6 +13,7 @@ from pathlib import Path
 from kurumaisu import program
 from kurumaisu.errors import Error
 from kurumaisu.ros import master
+from kurumaisu.ros.parent_launch import command_line, is_launch
 
 _HELP = """
 End the roslaunch that started this, with an error, when the ROS master was
@@ -38,7 +39,8 @@ def main() -> int:
     now = _run()
     if now is None or now == run:
         return 0  # somebody ended roslaunch, and the master is the same or gone
-    print(f"launch_watch: LAUNCH_MASTER_REPLACED: {_words(launch)} ends, for its nodes are unknown", file=sys.stderr)
+    words = f"{command_line(launch)} ends, for its nodes are unknown"
+    print(f"launch_watch: LAUNCH_MASTER_REPLACED: {words}", file=sys.stderr)
     return _end(launch)
 
 
@@ -52,7 +54,7 @@ def _run() -> str | None:
 
 def _end(launch: int) -> int:
     """End roslaunch in order, its nodes first. It has no exit code for an error: at its end it is killed."""
-    if "roslaunch" not in _words(launch):
+    if not is_launch(launch):
         return 1
     with contextlib.suppress(ProcessLookupError):
         os.kill(launch, signal.SIGINT)
@@ -61,12 +63,6 @@ def _end(launch: int) -> int:
             time.sleep(0.05)
         os.kill(launch, signal.SIGKILL)
     return 1
-
-
-def _words(pid: int) -> str:
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{pid}/cmdline").read_text(errors="replace").replace("\0", " ").strip()
-    return "the parent"
 
 
 def _children(pid: int) -> set[int]:

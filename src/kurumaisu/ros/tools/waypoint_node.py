@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import sys
 import threading
+from functools import partial
 
 import rospy
 from geometry_msgs.msg import Twist
@@ -12,7 +13,7 @@ from nav_msgs.msg import Odometry
 
 from kurumaisu import program, settings
 from kurumaisu.driving import Route, RouteFollower, read_route
-from kurumaisu.ros import life
+from kurumaisu.ros import life, parent_launch
 from kurumaisu.ros.inbox import seconds_of, subscribe
 from kurumaisu.ros.rotation import planar
 
@@ -62,16 +63,20 @@ class WaypointNode:
 
 def main() -> int:
     """Drive the route in the private parameters; return 1 when it is not done by its deadline."""
-    program.no_arguments("waypoint_node", _HELP)
-    return life.run("waypoint_node", _drive)
+    parser = program.node_parser("waypoint_node", _HELP)
+    parent_launch.add_option(parser)
+    options = parser.parse_args(program.words())
+    return life.run("waypoint_node", partial(_drive, options.ends_launch))
 
 
-def _drive(own: life.Life) -> int:
+def _drive(ends_launch: bool, own: life.Life) -> int:
     node = WaypointNode(read_route(settings.Section(_own_parameters(), rospy.get_name())))
     while not own.asked.is_set() and not node.finished.wait(0.1):
         pass
     if node.late:
         print(f"{rospy.get_name()}: the route was not done within its deadline", file=sys.stderr)
+    elif node.finished.is_set():
+        parent_launch.done(f"{rospy.get_name()}: the route is done", ends_launch, own.asked)
     return int(node.late)
 
 

@@ -38,13 +38,14 @@ class ViewTopics:
         machinery: Callable[[], Machinery],
         fans: Fans,
         drives: Callable[[], Mapping[int, str]],
+        seed: Callable[[], int],
     ) -> None:
         """Advertise; rate [Hz] at most; machinery: tells what runs now; drives: topics of commands by bodies' rows."""
         self._period, self._frame = 1 / rate, frame
-        self._machinery, self._fans, self._drives = machinery, fans, drives
+        self._machinery, self._fans, self._drives, self._seed = machinery, fans, drives, seed
         self._view = Outlet("~view", View, _NEWEST)
         self._world = rospy.Publisher("~world", String, queue_size=1, latch=True)
-        self._known: Machinery | None = None
+        self._known: tuple[Machinery, int] | None = None  # with the seed
         self._number = 0
         self._run = 0
         self._due = 0.0  # [s] of wall time
@@ -86,7 +87,7 @@ class ViewTopics:
         if not (self._fans.fresh or paused or wall >= self._due + self._period):
             return  # the next step may bring scans
         machinery = self._machinery()
-        if machinery is not self._known:
+        if self._known is None or machinery is not self._known[0] or self._seed() != self._known[1]:
             self._describe(machinery)
         self._due = wall + self._period
         self._looked = True
@@ -139,8 +140,8 @@ class ViewTopics:
         return self._wires[shape]
 
     def _describe(self, machinery: Machinery) -> None:
-        """Tell of other bodies."""
-        self._known = machinery
+        """Tell of other bodies, or another seed."""
+        self._known = machinery, self._seed()
         self._number += 1
         self._sent = None
         self._wires.clear()
@@ -150,6 +151,7 @@ class ViewTopics:
         drives = self._drives()
         content = {
             "world": self._number,
+            "seed": self._seed(),
             "bounds": bounds(pieces),
             "bodies": [{**_described(piece), "drive": drives.get(piece.row)} for piece in pieces],
             "robots": machinery.robot_rows.tolist(),  # rows of those whose odometry a View has

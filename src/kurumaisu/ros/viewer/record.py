@@ -9,8 +9,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import rospy
+
 from kurumaisu import children
 from kurumaisu.errors import Error
+from kurumaisu.ros.recorder import connected
 from kurumaisu.viewer.source import Outcome
 
 _GLANCE = 0.05  # [s]
@@ -26,12 +29,22 @@ class BagRecorder:
         self._lock = threading.Lock()
         self._process: subprocess.Popen[bytes] | None = None
         self._bag = Path()
+        self._receives = False
 
     @property
     def recording(self) -> str | None:
-        """Name of the bag that is being written."""
+        """Name of the bag that is being written, once it receives."""
+        return self._bag.name if self._runs and self._receives else None
+
+    @property
+    def starting(self) -> bool:
+        """Whether a bag was begun that receives nothing yet."""
+        return self._runs and not self._receives
+
+    @property
+    def _runs(self) -> bool:
         process = self._process
-        return self._bag.name if process is not None and process.poll() is None else None
+        return process is not None and process.poll() is None
 
     def record(self, on: bool) -> Outcome:
         """Begin or end a bag. Raise Error where that fails."""
@@ -45,13 +58,14 @@ class BagRecorder:
                 self._end()
 
     def _begin(self) -> Outcome:
-        if self.recording is not None:
+        if self._runs:
             raise Error(f"record: {self._bag} is being written already")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise Error(f"{self._folder}: {error.strerror}") from error
         self._bag = self._folder.resolve() / time.strftime("%Y-%m-%d-%H-%M-%S.bag")
+        self._receives = False
         # In a session of its own: Ctrl-C at the terminal reaches it by our close only, which waits for the bag.
         self._process = children.start(
             ["roslaunch", "kurumaisu", "record.launch", f"bag:={self._bag}"],
@@ -59,11 +73,12 @@ class BagRecorder:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        active = Path(f"{self._bag}.active")
-        self._wait(lambda: active.exists() or self.recording is None)
-        if not active.exists():
+        active, node = Path(f"{self._bag}.active"), rospy.resolve_name("record")
+        self._wait(lambda: not self._runs or (active.exists() and bool(connected(node))))
+        if not self._runs or not active.exists() or not connected(node):
             self._stop()
-            raise Error(f"{self._bag}: rosbag record does not start")
+            raise Error(f"{self._bag}: rosbag record does not start, or nothing that it records is published")
+        self._receives = True
         return Outcome(f"recording {self._bag}")
 
     def _end(self) -> Outcome:

@@ -71,6 +71,7 @@ class SimulationSource:
             "rtf": float(view.real_time_factor),
             "speed": float(view.speed),
             "paused": bool(view.paused),
+            "seed": int(self._world["seed"]),
             "poses": poses,
             "hit": tuple(rows[row] for row in np.flatnonzero(np.frombuffer(view.hit, np.uint8)) if row in rows),
             "contacts": {rows[row]: int(view.contacts[row]) for row in np.flatnonzero(view.contacts) if row in rows},

@@ -62,6 +62,7 @@ class RosSource:
         self.limits: Mapping[str, float] | None = None
         self._initial: Any = None
         if settings.control:
+            hub.new_token = f"rosservice call {rospy.get_name()}/new_token"
             self._initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
         if settings.control and driving.topic != NONE:
             self._sticks = Sticks(driving, self._scene.drives)
@@ -160,6 +161,7 @@ class RosSource:
             odom=None if odom is None else tuple(odom.tolist()),
             estimate=self._maps.estimate(truth),
             recording=self._bags.recording,
+            starting=self._bags.starting,
             notes=self._notes.now(),
         )
         self._hub.state(state, scans)

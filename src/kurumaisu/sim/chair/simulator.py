@@ -116,6 +116,11 @@ class ChairSimulator:
         """
         self._world.command(robot, np.asarray(velocity, dtype=np.float64))
 
+    @property
+    def seed(self) -> int:
+        """Seed of this run: of the last reset, or of the state that was loaded."""
+        return self._seed
+
     def set_pose(self, name: str, pose: FloatArray | Sequence[float]) -> None:
         """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any, cast
 
 import numpy as np
@@ -19,8 +20,10 @@ from kurumaisu.sim.robots import snapshot
 from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.model_changes import checked_pose, moved
 from kurumaisu.sim.robots.population import Population
+from kurumaisu.sim.robots.touch import touched
 from kurumaisu.sim.settings import Dynamics
 from kurumaisu.types import FloatArray
+from kurumaisu.world.model import Model
 
 _STILL = OdometryWalk(distance=0.0, heading_per_metre=0.0, heading_per_radian=0.0)
 # The rest of the simulator's options is about robots with odometry and rangers of their own.
@@ -100,14 +103,17 @@ class ChairWorld:
         self._have(moved(machinery, index, checked_pose(pose)))
         if index == self.chair:
             if self.overlaps():
+                why = ", ".join(self._in_the_way()) or "something"
                 moved(self.machinery, index, before)
-                raise Error(f"{name}: does not fit at {np.asarray(pose).tolist()}")
+                x, y, _, heading = pose
+                place = f"x {x:.3f} m, y {y:.3f} m, {math.degrees(heading):.1f} deg"
+                raise Error(f"{name}: does not fit at {place}; in the way: {why}")
             self.pose = self.machinery.frames[self.body, PLANAR]
 
     def overlaps(self) -> bool:
         """Return whether the chair touches something solid, or something solid is inside of it."""
         machinery = self.machinery
-        return bool(machinery.arena.touches(machinery.numbers[self.body : self.body + 1])[0]) or self._holds()
+        return bool(machinery.arena.touches(machinery.numbers[self.body : self.body + 1])[0]) or any(self._held())
 
     def state(self) -> dict[str, Any]:
         """Return all that changes."""
@@ -154,8 +160,14 @@ class ChairWorld:
         known = float(self.pose[2])
         self.pose = np.array([x, y, known + math.remainder(heading - known, math.tau)])
 
-    def _holds(self) -> bool:
-        """Return whether a corner of something solid, of its heights, is inside of the chair."""
+    def _in_the_way(self) -> list[str]:
+        """Return the names of what the chair overlaps; walls that effects have moved have none."""
+        machinery = self.machinery
+        models = [*touched(machinery, self.body), *self._held()]
+        return list(dict.fromkeys(model.name or f"a {model.type}" for model in models))
+
+    def _held(self) -> Iterator[Model]:
+        """Yield what is solid and has a corner, of the chair's heights, inside of the chair."""
         machinery = self.machinery
         frame = machinery.frames[self.body]
         model = machinery.population.models[self.chair]
@@ -167,5 +179,4 @@ class ChairWorld:
                 corners = np.hstack([ends, np.zeros((len(ends), 2))])
                 seen = relative(frame, attached(pose, corners))[:, :2]
                 if ((seen > self._corners.min(axis=0)) & (seen < self._corners.max(axis=0))).all(axis=1).any():
-                    return True
-        return False
+                    yield other

@@ -15,7 +15,7 @@ from kurumaisu.types import FloatArray
 from kurumaisu.world.layout import placed
 from kurumaisu.world.model import Model
 
-_LONGEST_THING = 2.0  # [m] what stands and is longer is a wall, which nobody drags by mistake
+_LARGEST_THING = 2.0  # [m] what stands and is longer or higher is a wall, which nobody drags by mistake
 WALLS = "walls"  # id of the walls as effects have moved them
 
 
@@ -79,7 +79,9 @@ def _piece(machinery: Machinery, head: int, members: list[int], row: int) -> Pie
             segments.append(placed(member.shape.segments, place))
     solid = [np.empty((0, 2)), *polygons]
     extent = np.ptp(np.concatenate(solid), axis=0).max() if polygons else np.inf
-    kind = _kind(model, row, float(extent))
+    kind = _kind(
+        model, row, max(float(extent), float(np.ptp(model.shape.heights)) if len(model.shape.heights) else 0.0)
+    )
     key = int(population.keys[head])
     return Piece(
         id=f"#{key}",
@@ -104,7 +106,7 @@ def _kind(model: Model, row: int, extent: float) -> str:
         return "robot"
     if model.walk is not None:
         return "person"
-    return "obstacle" if row >= 0 or extent <= _LONGEST_THING else "wall"  # a bitmap is one, too
+    return "obstacle" if row >= 0 or extent <= _LARGEST_THING else "wall"  # a bitmap is one, too
 
 
 def _turned(corners: FloatArray, pose: FloatArray) -> FloatArray:

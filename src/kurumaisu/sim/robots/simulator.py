@@ -118,6 +118,11 @@ class Simulator:
         machinery = self._machinery
         machinery.place(machinery.population.poses[machinery.bodies.heads])
 
+    @property
+    def seed(self) -> int:
+        """Seed of this run: of the last reset, or of the state that was loaded."""
+        return self._machinery.seed
+
     def set_pose(self, model: str | int | Model, pose: FloatArray | Sequence[float]) -> None:
         """Put a model, with all that stands on it, to a pose (4,) in the map: x, y, z [m], heading [rad].
 

@@ -13,6 +13,7 @@ export class BodyPanel {
     scene.on("state", () => this.#show());
     options.on("change", () => this.#choose());
     permit.on("change", () => this.#choose());
+    byId("place").addEventListener("input", () => (this.#typed = true));
     byId("place").addEventListener("submit", (event) => {
       event.preventDefault();
       this.#place();
@@ -22,6 +23,7 @@ export class BodyPanel {
 
   #bodies = [];
   #shown; // whose numbers the fields were filled with
+  #typed = false; // they are somebody's own since
 
   get #chosen() {
     return this.#bodies.find(({id}) => id === this.options.selected) ?? null;
@@ -54,17 +56,25 @@ export class BodyPanel {
     const text = pose ? `${fixed(pose[0], 3)} m, ${fixed(pose[1], 3)} m, ${fixed(degrees(pose[2]), 1)}°` : "–";
     setText(byId("body-pose"), text);
     setText(byId("body-hit"), body ? (this.scene.touches(body) ? "touches something" : "none") : "–");
-    if (!pose || this.#shown === body.id) return;
-    this.#shown = body.id;
-    byId("place-x").value = pose[0].toFixed(3);
-    byId("place-y").value = pose[1].toFixed(3);
-    byId("place-yaw").value = degrees(pose[2]).toFixed(1);
+    if (body?.id !== this.#shown) this.#typed = false;
+    this.#shown = body?.id;
+    if (pose && !this.#typed) this.#write(pose);
+  }
+
+  /** The form follows the body, until somebody types. */
+  #write([x, y, yaw]) {
+    for (const [name, text] of Object.entries({x: x.toFixed(3), y: y.toFixed(3), yaw: degrees(yaw).toFixed(1)})) {
+      const field = byId(`place-${name}`);
+      if (field.value !== text && document.activeElement !== field) field.value = text;
+    }
   }
 
   async #place() {
     const [x, y, yaw] = ["x", "y", "yaw"].map((name) => byId(`place-${name}`).valueAsNumber);
     const body = this.#chosen;
     const reply = await this.ask("set_pose", {body: body.id, x, y, yaw: radians(yaw)});
-    if (reply.ok) this.say(`${body.name} was moved there.`);
+    if (!reply.ok) return;
+    this.#typed = false;
+    this.say(`${body.name} was moved there.`);
   }
 }

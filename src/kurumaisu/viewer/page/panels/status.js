@@ -29,6 +29,7 @@ export class Status {
       this.#tellLine();
     });
     connection.on("refused", (why) => why && this.say(why, true));
+    byId("banner-copy").addEventListener("click", () => this.#copy());
     setInterval(() => this.#tellLine(), LOOK);
   }
 
@@ -54,6 +55,17 @@ export class Status {
     if (report) link.href = new URL(report, document.baseURI).pathname; // of this server, whatever it says
   }
 
+  async #copy() {
+    const place = byId("banner-command");
+    getSelection().selectAllChildren(place); // for who may not write to the clipboard, to copy by hand
+    try {
+      await navigator.clipboard.writeText(place.textContent);
+      this.say("The command was copied.");
+    } catch {
+      this.say("The command is selected: copy it with Ctrl-C.");
+    }
+  }
+
   #tellLine() {
     const {state, seconds, why} = this.#line;
     const silent = performance.now() - this.#heard;
@@ -74,9 +86,11 @@ export class Status {
   }
 
   #explain() {
-    const banner = byId("banner");
-    setText(banner, this.permit.notice);
-    banner.hidden = !this.permit.notice;
+    const {notice, command} = this.permit;
+    byId("banner").hidden = !notice;
+    setText(byId("banner-text"), notice);
+    setText(byId("banner-command"), command);
+    byId("banner-copy").hidden = !command;
   }
 
   #show(state) {

@@ -4,6 +4,9 @@
 import {byId, make, setPressed, setText} from "../common/dom.js";
 
 export class Transport {
+  #seed = null; // that was shown
+  #asked = false; // for a bag's beginning or end, and not answered yet
+
   /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */
   constructor(scene, permit, ask, stick, say) {
     Object.assign(this, {scene, permit, ask, stick, say});
@@ -39,7 +42,11 @@ export class Transport {
   }
 
   async #record() {
+    this.#asked = true;
+    this.#show();
     const reply = await this.ask("record", {on: !this.scene.state?.recording});
+    this.#asked = false;
+    this.#show();
     if (reply.ok) this.say(reply.message); // where the bag is
   }
 
@@ -60,6 +67,21 @@ export class Transport {
     choice.value = value;
   }
 
+  /** Show the seed of the run, until another one is typed. */
+  #showSeed(seed) {
+    if (seed == null || seed === this.#seed) return;
+    this.#seed = seed;
+    if (document.activeElement !== byId("seed")) byId("seed").value = String(seed);
+  }
+
+  #showRecord({recording, starting}) {
+    const waits = this.#asked || starting;
+    const text = recording ? `Stop recording ${recording}` : "Record a bag";
+    setText(byId("record"), waits ? (recording ? "Ending the bag" : "Starting to record") : text);
+    setPressed(byId("record"), recording);
+    byId("record").disabled = waits || !this.permit.can("record");
+  }
+
   #show() {
     const state = this.scene.state;
     if (!state) return;
@@ -67,8 +89,8 @@ export class Transport {
     setText(byId("pause"), state.paused ? "Run" : "Pause");
     byId("step").disabled = !this.permit.can("step") || !state.paused;
     if (this.permit.can("step")) byId("step").title = state.paused ? byId("step").dataset.title : "Pause first";
-    setText(byId("record"), state.recording ? `Stop recording ${state.recording}` : "Record a bag");
-    setPressed(byId("record"), state.recording);
+    this.#showSeed(state.seed);
+    this.#showRecord(state);
     setText(byId("estop"), this.stopped ? "Stopped: release" : "E-stop");
     setPressed(byId("estop"), this.stopped);
     byId("drive").disabled = !this.permit.can("drive") || this.stopped || !this.scene.hello.limits;

@@ -45,11 +45,12 @@ export class Camera {
     this.y += y - ny;
   }
 
-  /** Show all of [x0, y0, x1, y1]. */
-  fit([x0, y0, x1, y1]) {
-    this.x = (x0 + x1) / 2;
-    this.y = (y0 + y1) / 2;
-    const scale = ROOM * Math.min(this.width / Math.max(x1 - x0, 0.1), this.height / Math.max(y1 - y0, 0.1));
+  /** Show all of [x0, y0, x1, y1] between what covers the picture at its top and bottom [pixels]. */
+  fit([x0, y0, x1, y1], top = 0, bottom = 0) {
+    const free = Math.max(this.height - top - bottom, 1);
+    const scale = ROOM * Math.min(this.width / Math.max(x1 - x0, 0.1), free / Math.max(y1 - y0, 0.1));
     this.scale = Math.min(CLOSEST, Math.max(FARTHEST, scale));
+    this.x = (x0 + x1) / 2;
+    this.y = (y0 + y1) / 2 + (top - bottom) / 2 / this.scale;
   }
 }

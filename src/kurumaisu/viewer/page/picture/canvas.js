@@ -6,7 +6,7 @@ import {Camera} from "./camera.js";
 import {readColors} from "./colors.js";
 import {drawBodies, drawMarks} from "./bodies.js";
 import {drawGrid, drawWalls} from "./ground.js";
-import {drawLegend} from "./legend.js";
+import {covered, drawLegend} from "./legend.js";
 import {drawMap} from "./map.js";
 import {drawNames} from "./names.js";
 import {drawFans, drawScans} from "./scans.js";
@@ -48,7 +48,7 @@ export class Picture {
   fit() {
     const bounds = this.#bounds();
     if (bounds) {
-      this.camera.fit(bounds);
+      this.camera.fit(bounds, ...covered(this.camera.height));
       this.#whole = this.camera.place;
     }
     this.dirty();

@@ -12,6 +12,14 @@ const BOTTOM = 16;
 const LEAST = 60; // [px] width of the scale bar
 const COLORS = 140; // [px] width of the colour scale
 const ROOM = 240; // [px] height of a picture that has room for it
+const TOOLBAR = 44; // [px] above the picture
+const HEIGHT = 80; // [px] of all of the legend
+const LOW = 36; // [px] without the colour scale
+
+/** Return what of a picture's height toolbar and legend cover, at its top and at its bottom. */
+export function covered(height) {
+  return [TOOLBAR, height >= ROOM ? HEIGHT : LOW];
+}
 
 export function drawLegend(context, picture) {
   const {camera, colors, ratio, options, scene} = picture;

@@ -6,7 +6,8 @@ import {News} from "../common/dom.js";
 const OFF = "Not connected";
 const ASKING = "Asking for control";
 const CLOSED = "View only: the viewer was started without control; start it with viewer_control:=true.";
-const NO_TOKEN = "View only: to take control, open the link that the viewer printed at its start, or ask it for a new one.";
+const NO_TOKEN = "View only: to take control, open the link that the viewer printed at its start";
+const OR_NEW = ", or the one that this prints:";
 
 /** News: "change". */
 export class Permit extends News {
@@ -29,7 +30,14 @@ export class Permit extends News {
     if (!this.#line || !hello) return OFF;
     if (!hello.control && this.connection.asking) return ASKING;
     if (hello.control) return "";
-    return hello.abilities.length ? NO_TOKEN : CLOSED;
+    if (!hello.abilities.length) return CLOSED;
+    return this.command ? NO_TOKEN + OR_NEW : `${NO_TOKEN}.`;
+  }
+
+  /** The command that prints a link with a token, for who has none; "" where there is none. */
+  get command() {
+    const hello = this.scene.hello;
+    return this.#line && hello && !hello.control && hello.abilities.length && !this.connection.asking ? hello.new_token ?? "" : "";
   }
 
   /** Say so to everybody, not only on a control. */
@@ -57,7 +65,8 @@ export class Permit extends News {
       if (element.tagName === "FORM") element.firstElementChild.disabled = !this.can(name);
       else element.disabled = !this.can(name);
       element.dataset.title ??= element.title;
-      element.title = this.can(name) ? element.dataset.title : this.why || "This source does not have this command";
+      const why = this.command ? `${this.why} ${this.command}` : this.why;
+      element.title = this.can(name) ? element.dataset.title : why || "This source does not have this command";
     }
     this.tell("change");
   }
