@@ -4,8 +4,9 @@
 from decimal import Decimal
 from pathlib import Path
 
+import mcap.writer
 import numpy as np
-from rosbags.rosbag1 import Writer
+from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from kurumaisu.critic.values.recording import Run, Series
@@ -45,18 +46,55 @@ def nanoseconds(t):
     return int(Decimal(repr(float(t))) * 10**9)
 
 
-class Bag:
-    """Writes a run's parts as messages, with the rosbags library's own serialiser."""
+class Mcap:
+    """The mcap library's writer, called as those of rosbags are."""
 
-    def __init__(self, path, compression=None):
-        self.store = get_typestore(Stores.ROS1_NOETIC)
+    def __init__(self, path, store, ros, compression):
+        self.file = path.open("wb")
+        self.store, self.ros = store, ros
+        packed = mcap.writer.CompressionType[compression or "NONE"]
+        self.writer = mcap.writer.Writer(self.file, compression=packed, chunk_size=4096)
+        self.writer.start(profile=f"ros{ros}")
+
+    def add_connection(self, topic, kind, typestore):
+        text, _ = typestore.generate_msgdef(kind, ros_version=self.ros)
+        name = kind.replace("/msg/", "/") if self.ros == 1 else kind
+        schema = self.writer.register_schema(name, f"ros{self.ros}msg", text.encode())
+        return self.writer.register_channel(topic, "ros1" if self.ros == 1 else "cdr", schema)
+
+    def write(self, channel, received, data):
+        self.writer.add_message(channel, received, bytes(data), received)
+
+    def close(self):
+        self.writer.finish()
+        self.file.close()
+
+
+class Bag:
+    """Writes messages with the serialisers and writers of rosbags and mcap.
+
+    ros: 1 or 2, of the messages. path: .bag, .mcap, or for a folder of ROS 2 any other, with the storage of that name.
+    """
+
+    def __init__(self, path, compression=None, ros=1, storage="SQLITE3"):
+        self.ros = ros
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_JAZZY)
         text = (PACKAGE / "msg" / "Voltages.msg").read_text(encoding="utf-8")
         self.store.register(get_types_from_msg(text, "kurumaisu/msg/Voltages"))
-        self.writer = Writer(path)
-        if compression:
-            self.writer.set_compression(compression)
-        self.writer.open()
         self.connections = {}
+        if path.suffix == ".mcap":
+            self.writer = Mcap(path, self.store, ros, compression)
+            return
+        if ros == 1:
+            self.writer = rosbag1.Writer(path)
+            if compression:
+                self.writer.set_compression(compression)
+        else:
+            plugin = rosbag2.StoragePlugin[storage]
+            self.writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+            if compression:
+                self.writer.set_compression(compression, rosbag2.CompressionFormat.ZSTD)
+        self.writer.open()
 
     def make(self, kind, **values):
         return self.store.types[kind](**values)
@@ -64,13 +102,14 @@ class Bag:
     def header(self, t):
         ns = nanoseconds(t)
         stamp = self.make("builtin_interfaces/msg/Time", sec=ns // 10**9, nanosec=ns % 10**9)
-        return self.make("std_msgs/msg/Header", seq=0, stamp=stamp, frame_id="map")
+        counted = {"seq": 0} if self.ros == 1 else {}
+        return self.make("std_msgs/msg/Header", **counted, stamp=stamp, frame_id="map")
 
     def write(self, topic, message, received):
         kind = message.__msgtype__
         if topic not in self.connections:
             self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
-        data = self.store.serialize_ros1(message, kind)
+        data = (self.store.serialize_ros1 if self.ros == 1 else self.store.serialize_cdr)(message, kind)
         self.writer.write(self.connections[topic], nanoseconds(received), data)
 
     def vector(self, x=0.0, y=0.0, z=0.0, kind="Vector3"):
@@ -141,9 +180,9 @@ class Bag:
         )
 
 
-def write_bag(path, run, *, compression=None, stamped=True, late=0.0, slash="/"):
+def write_bag(path, run, *, compression=None, stamped=True, late=0.0, slash="/", **how):
     """Write a full run; late: how long after the stamp a message is received [s]; slash: what topics begin with."""
-    bag = Bag(path, compression)
+    bag = Bag(path, compression, **how)
     to_message = {
         "/voltages": (run.voltage, lambda t, row: bag.voltages(t, *row)),
         "/mocap/pose": (run.pose, bag.pose_stamped),

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
 from rosbags.rosbag1 import Writer
+from rosbags.rosbag2 import CompressionMode
 
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
@@ -29,6 +30,42 @@ def test_a_bag_says_the_same_as_csv(tmp_path, compression, start):
     # What the sensor reported in millimetres is the same number, not its float32 neighbour.
     np.testing.assert_array_equal(by_csv.runs[0].scan.values, by_bag.runs[0].scan.values)
     assert by_bag.runs[0].fan.beams == BEAMS
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    {
+        "sqlite3": ("run_1", {"ros": 2}),
+        "sqlite3, messages packed": ("run_1", {"ros": 2, "compression": CompressionMode.MESSAGE}),
+        "sqlite3, file packed": ("run_1", {"ros": 2, "compression": CompressionMode.FILE}),
+        "mcap of ros2 bag": ("run_1", {"ros": 2, "storage": "MCAP"}),
+        "mcap of ros2 bag, packed": (
+            "run_1",
+            {"ros": 2, "storage": "MCAP", "compression": CompressionMode.STORAGE},
+        ),
+        "mcap with ros 1": ("run_1.mcap", {"ros": 1, "compression": "LZ4"}),
+        "mcap with ros 2": ("run_1.mcap", {"ros": 2, "compression": "ZSTD"}),
+        "mcap, not packed": ("run_1.mcap", {"ros": 2}),
+    }.values(),
+    ids=str,
+)
+def test_every_container_says_the_same_as_csv(tmp_path, name, how):
+    run = full_run(start=1.7e9)
+    (tmp_path / "meta.yaml").write_text(META)
+    write_bag(tmp_path / name, run, late=0.03, **how)
+    recording = read_recording(tmp_path)
+    assert recording.problems == ()
+    assert recording.train == ("run_1",)
+    assert_same(run, recording.runs[0], atol=1e-12)
+    np.testing.assert_array_equal(recording.runs[0].scan.values, run.scan.values)
+
+
+def test_a_file_of_a_ros2_bag_is_read_alone(tmp_path):
+    run = full_run()
+    (tmp_path / "meta.yaml").write_text(META)
+    write_bag(tmp_path / "inner" / "drive", run, ros=2)
+    (tmp_path / "inner" / "drive" / "drive.db3").replace(tmp_path / "run_1.db3")
+    assert_same(run, read_recording(tmp_path).runs[0], atol=1e-12)
 
 
 def test_a_twist_without_a_stamp_counts_when_received(tmp_path):

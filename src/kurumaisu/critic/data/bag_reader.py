@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Read a run from the topics of a ROS 1 bag."""
+"""Read a run from the topics of a bag."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.data import messages
-from kurumaisu.critic.data.bag_topics import Topic, read_topics
+from kurumaisu.critic.bags import messages
+from kurumaisu.critic.bags.containers import bag_name
+from kurumaisu.critic.bags.decoding import shown
+from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.data.clean import Faults, Table, clean
 from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 # Topic of each part, where meta.yaml names no other.
 TOPICS = {
@@ -45,32 +49,50 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: 
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
-
-    def kept(row: tuple[Fan, FloatArray, FloatArray | None]) -> tuple[Fan, FloatArray]:
-        fan, ranges, intensities = row
-        return fan, ranges if put_aside is None else np.array([put_aside(ranges, intensities)], dtype=np.float64)
-
-    found = read_topics(path, {topic: part for part, topic in wanted.items()}, {"scan": kept})
-    if "command" not in found:
-        found |= read_topics(path, {SCRIPTED: "command"})
+    found = _found(path, wanted, put_aside)
     for part in sorted(set(_parts(topics)) - set(found)):
         faults.add(f"{path.name}: there is no topic {wanted[part]}")
     _check_clocks(path.name, found, faults)
-    found = {part: _last_of_each_time(f"{path.name} {topic.name}", topic, faults) for part, topic in found.items()}
     series: dict[str, Series | None] = {}
     fan, covariates = None, {}
     for part, topic in found.items():
         where = f"{path.name} {topic.name}"
+        keep = _last_of_each_time(where, topic, faults)
         if part == "scan":
-            series["scan"], fan = _scan(where, topic, faults, aside=put_aside is not None)
+            series["scan"], fan = _scan(where, topic, keep, faults, aside=put_aside is not None)
         elif part in PARTS:
-            columns, rows = messages.COLUMNS[part], np.asarray(topic.rows, dtype=np.float64)
+            columns, rows = messages.COLUMNS[part], topic.rows()[keep]
             if part == "voltage" and not np.nan_to_num(rows[:, 2:]).any():
                 columns, rows = columns[:2], rows[:, :2]
-            series[part] = clean(Table(where, topic.times(), rows, columns, "message", 1), faults)
+            series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
-            covariates.update(_covariates(part, where, topic, faults))
-    return replace(run_of_parts(path.stem, series, covariates), fan=fan)
+            covariates.update(_covariates(part, where, topic, keep, faults))
+    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+
+
+def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> dict[str, Topic]:
+    """Return the topics that are in the bag, by part."""
+
+    def converter(part: str, kind: str) -> Convert:
+        convert = messages.converter(part, kind)
+        if convert is None:
+            accepted = ", ".join(shown(name) for name in messages.accepted(part))
+            raise Error(f"is of type {shown(kind)}, not of {accepted}")
+        if part == "scan" and put_aside is not None:
+            return lambda message: _aside(convert(message), put_aside)
+        return convert
+
+    parts = {topic: part for part, topic in wanted.items()}
+    found = read_topics(path, {topic: partial(converter, part) for topic, part in parts.items()})
+    if wanted["command"] not in found:
+        scripted = read_topics(path, {SCRIPTED: partial(converter, "command")})
+        if SCRIPTED in scripted:
+            found[wanted["command"]] = scripted[SCRIPTED]
+    return {part: found[topic] for part, topic in wanted.items() if topic in found}
+
+
+def _aside(row: ScanRow, put_aside: PutAside) -> ScanRow:
+    return row._replace(ranges=np.array([put_aside(row.ranges, row.intensities)], dtype=np.float64), intensities=None)
 
 
 def resolve(topics: dict[str, str]) -> dict[str, str]:
@@ -94,42 +116,40 @@ def _check_clocks(name: str, found: dict[str, Topic], faults: Faults) -> None:
         faults.add(f"{name}: stamps come from different clocks; receipt minus stamp: {told}", fatal=True)
 
 
-def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> Topic:
-    """Return a topic without stamps with one message for each time of receipt: the last, which holds from then on.
+def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> IntArray:
+    """Return which messages count, (n,); of a topic without stamps, the last for each time of receipt.
 
     The clock of receipt has ticks, those of a simulation or of a replay coarse ones: what comes within one is no copy.
     """
+    received = np.sort(np.asarray(topic.received))
     if any(topic.stamps):
-        return topic
-    received = np.array(topic.received)
+        return np.arange(len(received))
     keep = np.flatnonzero(np.r_[received[1:] != received[:-1], True])
     dropped = len(received) - len(keep)
-    if not dropped:
-        return topic
-    are = "message was" if dropped == 1 else "messages were"
-    faults.add(f"{where}: {dropped} {are} dropped: a later one has the same time of receipt")
-    rows, stamps = [topic.rows[i] for i in keep], [topic.stamps[i] for i in keep]
-    return replace(topic, received=received[keep].tolist(), stamps=stamps, rows=rows)
+    if dropped:
+        are = "message was" if dropped == 1 else "messages were"
+        faults.add(f"{where}: {dropped} {are} dropped: a later one has the same time of receipt")
+    return keep
 
 
-def _scan(where: str, topic: Topic, faults: Faults, *, aside: bool) -> tuple[Series | None, Fan | None]:
-    fan = topic.rows[0][0]
-    keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
-    if len(keep) < len(topic.rows):
-        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their angles differ from those of the first")
-    ranges = np.stack([topic.rows[i][1] for i in keep])
+def _scan(where: str, topic: Topic, keep: IntArray, faults: Faults, *, aside: bool) -> tuple[Series | None, Fan | None]:
+    scans = [topic.scans[i] for i in topic.order()[keep]]
+    fan = scans[0].fan
+    alike = [i for i, scan in enumerate(scans) if scan.fan == fan]
+    if len(alike) < len(scans):
+        faults.add(f"{where}: {len(scans) - len(alike)} scans dropped: their angles differ from those of the first")
+    ranges = np.stack([scans[i].ranges for i in alike])
     columns = ("row",) if aside else tuple(f"r{i}" for i in range(fan.beams))
-    return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=not aside), fan
+    times = topic.times()[keep][alike]
+    return clean(Table(where, times, ranges, columns, "scan", 1), faults, ranges=not aside), fan
 
 
-def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str, Series]:
-    fields = topic.rows[0].keys()
-    t = topic.times()
-    covariates = {}
-    if not fields:
+def _covariates(name: str, where: str, topic: Topic, keep: IntArray, faults: Faults) -> dict[str, Series]:
+    if not topic.columns:
         raise Error(f"{where}: {topic.type} has no numeric field, so it cannot be a covariate")
-    for key in fields:
-        values = np.array([row[key] for row in topic.rows], dtype=np.float64)
+    t, rows = topic.times()[keep], topic.rows()[keep]
+    covariates = {}
+    for key, values in zip(topic.columns, rows.T, strict=True):
         # A driver that does not measure a field leaves it at 0 or nan.
         if key and not np.nan_to_num(values).any():
             continue

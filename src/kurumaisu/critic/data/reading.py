@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.data.bag_parts import is_split
+from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
+from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.data.bag_reader import PutAside, read_bag_run, resolve
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run, usable
@@ -48,19 +49,21 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
 
 def sources(path: Path) -> list[Path]:
     """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
+    if is_bag(path):
+        return [path]
     if not path.is_dir():
-        if path.suffix != ".bag" and not is_rawlog(path):
-            raise Error(f"{path}: is not a recording: give a folder, a .bag or a .rawlog")
+        if not is_rawlog(path):
+            raise Error(f"{path}: is not a recording: give a folder, a bag ({', '.join(SUFFIXES)}) or a .rawlog")
         return [path]
     inside = sorted(path.iterdir())
-    bags = [item for item in inside if item.suffix == ".bag" or is_rawlog(item)]
-    folders = [item for item in inside if item.is_dir() and is_csv_run(item)]
+    bags = [item for item in inside if is_bag(item) or is_rawlog(item)]
+    folders = [item for item in inside if item.is_dir() and item not in bags and is_csv_run(item)]
     if is_csv_run(path):
         if bags or folders:
             raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): one or the other")
         return [path]
     # The queries of a bag's run lie in a folder of its name, alone.
-    names = [bag.stem for bag in bags]
+    names = [_run_name(bag) for bag in bags]
     for folder in [folder for folder in folders if folder.name in names]:
         others = [item.name for item in folder.glob("*.csv") if item.stem != QUERY]
         if others:
@@ -70,7 +73,7 @@ def sources(path: Path) -> list[Path]:
     if twice:
         raise Error(f"{path}: the run {twice[0]} exists twice")
     if not bags and not folders:
-        raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
+        raise Error(f"{path}: holds no run: neither a bag, nor a .rawlog, nor a folder with tables like pose.csv")
     return sorted(bags + folders, key=lambda item: item.stem)
 
 
@@ -78,12 +81,12 @@ def read_run(
     source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
 ) -> tuple[Run, LaserMount | None]:
     """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
-    if source.is_dir():
+    if source.is_dir() and not is_bag(source):
         return read_csv_run(source, source.resolve().name, faults), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
     run = read_bag_run(source, meta.topics, faults, put_aside)
-    queries = source.with_suffix("") / f"{QUERY}.csv"
+    queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
@@ -98,9 +101,7 @@ def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
 
 def _run_name(source: Path) -> str:
     """Return the name that a run of this source has."""
-    if source.is_dir():
-        return source.resolve().name
-    return rawlog_name(source) if is_rawlog(source) else source.stem
+    return rawlog_name(source) if is_rawlog(source) else bag_name(source)
 
 
 def split(

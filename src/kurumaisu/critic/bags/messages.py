@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,14 @@ MAIN_FIELD = {
 RANGE_DECIMALS = 6
 
 Converter = Callable[[Any], Any]
+
+
+class ScanRow(NamedTuple):
+    """A scan: its fan, ranges [m], (beams,), and intensities, None where there is not one for each."""
+
+    fan: Fan
+    ranges: Any
+    intensities: Any
 
 
 def converter(part: str, kind: str) -> Converter | None:
@@ -61,8 +69,7 @@ def _yaw(q: Any) -> float:
         return math.nan
 
 
-def _scan(message: Any) -> tuple[Fan, Any, Any]:
-    """Return the fan, its ranges, and its intensities, None where there is not one for each."""
+def _scan(message: Any) -> ScanRow:
     ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
     # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
     ranges[(ranges < round(message.range_min, RANGE_DECIMALS)) | (ranges <= 0)] = np.nan
@@ -71,7 +78,7 @@ def _scan(message: Any) -> tuple[Fan, Any, Any]:
     numbers = (message.angle_min, message.angle_increment, message.time_increment, message.scan_time)
     angle_min, increment, time_increment, scan_time = (float(number) for number in numbers)
     intensities = message.intensities if len(message.intensities) == len(ranges) else None
-    return Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities
+    return ScanRow(Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities)
 
 
 def _numbers(message: Any, main: str) -> dict[str, float]:
