@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A made-up drive, and how to write it as a bag, for the tests of the readers."""
 
+import dataclasses
 from decimal import Decimal
 from pathlib import Path
 
@@ -81,6 +82,9 @@ class Bag:
         self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_JAZZY)
         text = (PACKAGE / "msg" / "Voltages.msg").read_text(encoding="utf-8")
         self.store.register(get_types_from_msg(text, "kurumaisu/msg/Voltages"))
+        if ros == 1:
+            text = "geometry_msgs/TransformStamped[] transforms"
+            self.store.register(get_types_from_msg(text, "tf2_msgs/msg/TFMessage"))
         self.connections = {}
         if path.suffix == ".mcap":
             self.writer = Mcap(path, self.store, ros, compression)
@@ -124,6 +128,42 @@ class Bag:
 
     def pose_stamped(self, t, pose):
         return self.make("geometry_msgs/msg/PoseStamped", header=self.header(t), pose=self.pose(*pose))
+
+    def pose_with_covariance(self, t, pose):
+        posed = self.make("geometry_msgs/msg/PoseWithCovariance", pose=self.pose(*pose), covariance=np.zeros(36))
+        return self.make("geometry_msgs/msg/PoseWithCovarianceStamped", header=self.header(t), pose=posed)
+
+    def transform(self, t, parent, child, pose):
+        posed = self.pose(*pose)
+        moved = self.vector(posed.position.x, posed.position.y)
+        return self.make(
+            "geometry_msgs/msg/TransformStamped",
+            header=dataclasses.replace(self.header(t), frame_id=parent),
+            child_frame_id=child,
+            transform=self.make("geometry_msgs/msg/Transform", translation=moved, rotation=posed.orientation),
+        )
+
+    def transforms(self, *transforms):
+        return self.make("tf2_msgs/msg/TFMessage", transforms=list(transforms))
+
+    def point_stamped(self, t, x, y):
+        return self.make("geometry_msgs/msg/PointStamped", header=self.header(t), point=self.vector(x, y, kind="Point"))
+
+    def fix(self, t, latitude, longitude):
+        return self.make(
+            "sensor_msgs/msg/NavSatFix",
+            header=self.header(t),
+            status=self.make("sensor_msgs/msg/NavSatStatus", status=0, service=1),
+            latitude=latitude,
+            longitude=longitude,
+            altitude=300.0,
+            position_covariance=np.zeros(9),
+            position_covariance_type=0,
+        )
+
+    def joints(self, t, names, angles, rates):
+        values = {"position": np.array(angles), "velocity": np.array(rates), "effort": np.zeros(0)}
+        return self.make("sensor_msgs/msg/JointState", header=self.header(t), name=names, **values)
 
     def odometry(self, t, pose, v, w):
         none = np.zeros(36)

@@ -69,6 +69,48 @@ def test_a_missing_column_is_named(folder):
         read_recording(folder)
 
 
+def test_a_heading_by_another_name_is_no_covariate(folder):
+    path = folder / "run_1" / "pose.csv"
+    rewrite(path, ["t,x,y,Yaw", *lines_of(path)[1:]])
+    with pytest.raises(
+        Error, match=r"pose\.csv:1: column 'theta' is missing: rename column 'Yaw' if it is the heading"
+    ):
+        read_recording(folder)
+
+
+def test_odometry_needs_no_rates_and_a_reference_no_headings(tmp_path):
+    """An eight of 2 m, forward and then backward along the same way; the heading is that of the derivative."""
+    s = np.linspace(0, 2 * np.pi, 401)
+    s = np.r_[s, s[-2::-1]]
+    t = 0.1 * np.arange(len(s))
+    theta = np.unwrap(np.arctan2(2 * np.cos(2 * s), 2 * np.cos(s)))
+    noise = np.random.default_rng(5).normal(0, 0.002, (2, len(s)))
+    true = 2 * np.sin(s), np.sin(2 * s)
+    run = Run(
+        "drive",
+        pose=series(t, "xy", *(true + noise)),
+        odom=series(t, ("x", "y", "theta"), *true, 0.9 * (theta - theta[0])),
+    )
+    write_csv_run(tmp_path / "drive", run)
+    recording = read_recording(tmp_path)
+    (read,) = recording.runs
+    assert read.odom.columns == ("x", "y", "theta", "v", "w")
+    np.testing.assert_allclose(read.odom.column("w")[100], 0.9 * (theta[100] - theta[99]) / 0.1, rtol=1e-6)
+    assert read.pose.columns == ("x", "y", "theta")
+    off = read.pose.column("theta") - theta
+    assert np.abs(off[20:-20]).max() < 0.1  # the odometry's turns are short by a tenth: 0.6 rad
+    assert any("has no headings" in words and "follow the odometry in between" in words for words in recording.problems)
+
+
+def test_a_reference_without_ways_tells_no_heading(tmp_path):
+    t = 0.1 * np.arange(50)
+    still = np.random.default_rng(1).normal(0, 0.001, (2, 50))
+    command = series([0.0], "vw", [0.0], [0.0])
+    write_csv_run(tmp_path / "drive", Run("drive", pose=series(t, "xy", *still), command=command))
+    with pytest.raises(Error, match="no two ways of 0.05 m to tell headings from: not used"):
+        read_recording(tmp_path)
+
+
 def test_columns_may_come_in_any_order_quoted_and_with_covariates_among_them(folder):
     path = folder / "run_1" / "command.csv"
     path.write_text('﻿"w","note","t","load","v"\n"0.1",go,0.0,70,"0.5"\n0.2,stop,1.0,,0.6\n', encoding="utf-8")

@@ -20,7 +20,7 @@ from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray, IntArray
 
 Row = tuple[float, ...] | dict[str, float] | ScanRow
-Convert = Callable[[Any], Row]
+Convert = Callable[[Any], Row | None]  # None: a message that says nothing of what is wanted
 Wanted = Mapping[str, Callable[[str], Convert]]
 
 
@@ -91,12 +91,14 @@ def read_topics(path: Path, wanted: Wanted) -> dict[str, Topic]:
                 raise Error(f"{where}: {error}") from error
         topic = found.setdefault(name, Topic(connection.topic, shown(kind)))
         try:
-            topic.add(received, _stamp(message), converters[name, kind](message))
+            row = converters[name, kind](message)
+            if row is not None:
+                topic.add(received, _stamp(message), row)
         except AttributeError as error:
             raise Error(f"{where}: {shown(kind)} has another definition here: {error}") from error
         except Error as error:
             raise Error(f"{where}: {error}") from error
-    return found
+    return {name: topic for name, topic in found.items() if topic.received}
 
 
 def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[Path, Connection, int, Any]]:

@@ -15,9 +15,14 @@ from kurumaisu.critic.bags.containers import bag_name
 from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.messages import ScanRow
 from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
+from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.odometry import COLUMNS
+from kurumaisu.critic.data.wheel_reader import read_wheels
 from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
 from kurumaisu.types import FloatArray, IntArray
 
 # Topic of each part, where meta.yaml names no other.
@@ -37,20 +42,24 @@ PutAside = Callable[[FloatArray, FloatArray | None], int]
 CLOCK_TOLERANCE = 1.0
 
 
-def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: PutAside | None = None) -> Run:
-    """Read the topics of a bag. topics: from meta.yaml, by default name or by name of a covariate.
+def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None) -> Run:
+    """Read the topics of a bag that meta names, by default name or by name of a covariate, its frames and its wheels.
 
     put_aside: takes the ranges and the intensities of each scan and returns their number, which the run's scan then has
     for its only column; None: it has the ranges.
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
-    wanted = resolve(topics)
+    wanted = resolve(meta.topics)
+    if meta.frames is not None:
+        del wanted["pose"]
+    if meta.wheels is not None:
+        del wanted["odom"]
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
     found = _found(path, wanted, put_aside)
-    for part in sorted(set(_parts(topics)) - set(found)):
+    for part in sorted(set(_parts(meta.topics)) & set(wanted) - set(found)):
         faults.add(f"{path.name}: there is no topic {wanted[part]}")
     _check_clocks(path.name, found, faults)
     series: dict[str, Series | None] = {}
@@ -61,13 +70,47 @@ def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: 
         if part == "scan":
             series["scan"], fan = _scan(where, topic, keep, faults, aside=put_aside is not None)
         elif part in PARTS:
-            columns, rows = messages.COLUMNS[part], topic.rows()[keep]
-            if part == "voltage" and not np.nan_to_num(rows[:, 2:]).any():
-                columns, rows = columns[:2], rows[:, :2]
+            columns, rows = _said(part, topic, keep)
             series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
+    if meta.frames is not None:
+        where = f"{path.name} tf {meta.frames[1]} in {meta.frames[0]}"
+        series["pose"] = clean(
+            Table(where, *read_frame(path, *meta.frames), ("x", "y", "theta"), "transform", 1), faults
+        )
+    if meta.wheels is not None:
+        t, rows = read_wheels(path, meta.wheels)
+        series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
     return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+
+
+def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the columns that the messages of a part have, and their rows, (n, columns)."""
+    rows = topic.rows()[keep]
+    if topic.type == messages.FIX:
+        rows = _east_and_north(rows)
+    # Fields at 0 throughout were not filled in.
+    needed = {"voltage": 2, "odom": 3}.get(part, rows.shape[1])
+    if not np.nan_to_num(rows[:, needed:]).any():
+        rows = rows[:, :needed]
+    return messages.COLUMNS[part][: rows.shape[1]], rows
+
+
+def _east_and_north(fixes: FloatArray) -> FloatArray:
+    """Return metres east and north of the first fix, (n, 2), of latitudes and longitudes (n, 2) [rad].
+
+    Along the ellipsoid WGS 84 at that latitude: a kilometre from there, a heading is off by less than 2e-4 rad.
+    """
+    known = fixes[np.isfinite(fixes).all(axis=1)]
+    if not len(known):
+        return fixes
+    latitude, longitude = known[0]
+    a, square = 6378137.0, 6.69437999014e-3
+    bend = 1 - square * np.sin(latitude) ** 2
+    east = a / np.sqrt(bend) * np.cos(latitude) * wrap(fixes[:, 1] - longitude)
+    north = a * (1 - square) / bend**1.5 * (fixes[:, 0] - latitude)
+    return np.stack([east, north], axis=1)
 
 
 def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> dict[str, Topic]:
@@ -77,7 +120,7 @@ def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> di
         convert = messages.converter(part, kind)
         if convert is None:
             accepted = ", ".join(shown(name) for name in messages.accepted(part))
-            raise Error(f"is of type {shown(kind)}, not of {accepted}")
+            raise Error(messages.refusal(kind) or f"is of type {shown(kind)}, not of {accepted}")
         if part == "scan" and put_aside is not None:
             return lambda message: _aside(convert(message), put_aside)
         return convert

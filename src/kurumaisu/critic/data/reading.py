@@ -11,6 +11,7 @@ from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.data.bag_reader import PutAside, read_bag_run, resolve
 from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, read_queries
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
@@ -81,11 +82,16 @@ def read_run(
     source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
 ) -> tuple[Run, LaserMount | None]:
     """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
+    run, mount = _read(source, meta, faults, put_aside)
+    return completed(run, meta.command_hold, faults), mount
+
+
+def _read(source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None) -> tuple[Run, LaserMount | None]:
     if source.is_dir() and not is_bag(source):
         return read_csv_run(source, source.resolve().name, faults), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
-    run = read_bag_run(source, meta.topics, faults, put_aside)
+    run = read_bag_run(source, meta, faults, put_aside)
     queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
