@@ -107,7 +107,7 @@ def test_a_reference_without_ways_tells_no_heading(tmp_path):
     still = np.random.default_rng(1).normal(0, 0.001, (2, 50))
     command = series([0.0], "vw", [0.0], [0.0])
     write_csv_run(tmp_path / "drive", Run("drive", pose=series(t, "xy", *still), command=command))
-    with pytest.raises(Error, match="no two ways of 0.05 m to tell headings from: not used"):
+    with pytest.raises(Error, match=r"no two ways of 0\.05 m to tell headings from: not used"):
         read_recording(tmp_path)
 
 

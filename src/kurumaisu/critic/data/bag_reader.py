@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,15 +14,18 @@ from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import bag_name
 from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
 from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
+from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS
-from kurumaisu.critic.data.wheel_reader import read_wheels
+from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
 from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
+from kurumaisu.names import hint
 from kurumaisu.types import FloatArray, IntArray
 
 # Topic of each part, where meta.yaml names no other.
@@ -50,17 +53,12 @@ def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | N
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
-    wanted = resolve(meta.topics)
-    if meta.frames is not None:
-        del wanted["pose"]
-    if meta.wheels is not None:
-        del wanted["odom"]
+    wanted = _own(meta)
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
     found = _found(path, wanted, put_aside)
-    for part in sorted(set(_parts(meta.topics)) & set(wanted) - set(found)):
-        faults.add(f"{path.name}: there is no topic {wanted[part]}")
+    _name_absent(path, sorted(set(_parts(meta.topics)) & set(wanted) - set(found)), wanted, faults)
     _check_clocks(path.name, found, faults)
     series: dict[str, Series | None] = {}
     fan, covariates = None, {}
@@ -74,15 +72,30 @@ def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | N
             series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
+    series.update(_worked_out(path, meta, faults))
+    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+
+
+def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faults: Faults) -> None:
+    """Note topics of meta.yaml that are not there, with those that could serve in their place."""
+    found = survey(path) if absent else []
+    for part in absent:
+        fitting = [topic for topic in found if part in topic.serves and topic.name not in wanted.values()]
+        words = f"there are: {listed(fitting)}" if fitting else hint(wanted[part], [topic.name for topic in found])
+        faults.add(f"{path.name}: there is no topic {wanted[part]}; {words}")
+
+
+def _worked_out(path: Path, meta: Meta, faults: Faults) -> dict[str, Series | None]:
+    """Return the parts that no topic has as they are: the reference out of tf, and odometry out of wheels."""
+    series = {}
     if meta.frames is not None:
         where = f"{path.name} tf {meta.frames[1]} in {meta.frames[0]}"
-        series["pose"] = clean(
-            Table(where, *read_frame(path, *meta.frames), ("x", "y", "theta"), "transform", 1), faults
-        )
+        t, rows = read_frame(path, *meta.frames)
+        series["pose"] = clean(Table(where, t, rows, COLUMNS[:3], "transform", 1), faults)
     if meta.wheels is not None:
         t, rows = read_wheels(path, meta.wheels)
         series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
-    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+    return series
 
 
 def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], FloatArray]:
@@ -136,6 +149,43 @@ def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> di
 
 def _aside(row: ScanRow, put_aside: PutAside) -> ScanRow:
     return row._replace(ranges=np.array([put_aside(row.ranges, row.intensities)], dtype=np.float64), intensities=None)
+
+
+def inventory(path: Path, meta: Meta) -> str:
+    """Return in words what could be mapped in meta.yaml, and the topics that a bag has."""
+    found = survey(path)
+    return "; ".join(
+        [*(f"meta.yaml could say {words}" for words in mappings(found, meta)), f"{path.name} has {listed(found)}"]
+    )
+
+
+def mappings(found: Sequence[Found], meta: Meta) -> list[str]:
+    """Return what meta.yaml could say so that more of a bag's topics are used, ready to paste."""
+    own = _own(meta)
+    proposed = {TOPICS[part]: topic for part, topic in proposal(found, own).items()}
+    words = [f"topics: {_yaml({**meta.topics, **proposed})}"] if proposed else []
+    names = {topic.name for topic in found}
+    if TRANSFORMS[0] in names and "pose" in own and own["pose"] not in names:
+        words.append("reference: {tf: [map, base_link]}")
+    joints = [topic.name for topic in found if topic.type == shown(JOINTS)]
+    if joints and "odom" in own and own["odom"] not in names:
+        words.append(f"wheels: {{topic: {joints[0]}, left: JOINT, right: JOINT, radius: METRES, track: METRES}}")
+    return words
+
+
+def _own(meta: Meta) -> dict[str, str]:
+    """Return the absolute topic of each part and covariate that is read from one."""
+    own = resolve(meta.topics)
+    if meta.frames is not None:
+        del own["pose"]
+    if meta.wheels is not None:
+        del own["odom"]
+    return own
+
+
+def _yaml(mapping: dict[str, str]) -> str:
+    """Return topics by name as YAML has it, in one line."""
+    return f"{{{', '.join(f'{key}: {topic}' for key, topic in mapping.items())}}}"
 
 
 def resolve(topics: dict[str, str]) -> dict[str, str]:

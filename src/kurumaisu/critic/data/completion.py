@@ -36,8 +36,8 @@ def completed(run: Run, hold: float | None, faults: Faults) -> Run:
         return replace(run, pose=None)
     between = "straight lines" if guide is None else guide.name
     faults.add(
-        f"{run.name}: the reference has no headings: they are the directions of ways of {way:.2g} m, and follow {between} "
-        "in between; what was measured is taken to be above the middle of the axle"
+        f"{run.name}: the reference has no headings: they are the directions of ways of {way:.2g} m, and follow "
+        f"{between} in between; what was measured is taken to be above the middle of the axle"
     )
     return replace(run, pose=pose)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
 from kurumaisu.critic.bags.parts import is_split
-from kurumaisu.critic.data.bag_reader import PutAside, read_bag_run, resolve
+from kurumaisu.critic.data.bag_reader import PutAside, inventory, read_bag_run, resolve
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run, usable
@@ -21,6 +21,8 @@ from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 
+META = "meta.yaml"
+
 
 def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
@@ -30,22 +32,35 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
-    if not path.exists() and not is_split(path):
-        raise Error(f"{path}: there is no such file or folder")
-    meta_file = path / "meta.yaml"
-    meta = read_meta(meta_file) if meta_file.exists() else Meta()
+    meta = meta_of(path)
     faults = Faults()
     laser = meta.laser
     runs = []
-    for source in chosen(sources(path), wanted):
+    kept = chosen(sources(path), wanted)
+    for source in kept:
         run, mount = read_run(source, meta, faults)
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
-    require_use(path, runs, meta, faults)
-    train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
+    require_use(path, runs, meta, faults, bags=[source for source in kept if is_bag(source) or is_split(source)])
+    train, test = split(path / META, meta, [run.name for run in runs], partly=bool(wanted))
     name = path.resolve().name if path.is_dir() else path.resolve().stem
     return recording_of_meta(name, runs, replace(meta, laser=laser), faults, train=train, test=test)
+
+
+def meta_of(path: Path) -> Meta:
+    """Return what meta.yaml says of a recording: the one inside a folder, else the one beside a bag or a rawlog.
+
+    One beside it speaks of all that lies there: which runs are fitted does not concern a single one.
+    Raise Error naming file and key, and where there is no such recording.
+    """
+    if not path.exists() and not is_split(path):
+        raise Error(f"{path}: there is no such file or folder")
+    inside, beside = path / META, path.resolve().parent / META
+    if path.is_dir() and inside.exists():
+        return read_meta(inside)
+    alone = is_split(path) or is_bag(path) or is_rawlog(path)
+    return replace(read_meta(beside), train=(), test=()) if alone and beside.exists() else Meta()
 
 
 def sources(path: Path) -> list[Path]:
@@ -125,8 +140,11 @@ def split(
     return train, tuple(name for name in meta.test if name in names)
 
 
-def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
-    """Raise Error unless a run says something about base or laser; note the runs that do not."""
+def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults, bags: Sequence[Path] = ()) -> None:
+    """Raise Error unless a run says something about base or laser, with what is in the first of the bags.
+
+    Note the runs that do not.
+    """
     useless = [run for run in runs if not usable(run)]
     told = {f"{run.name}: is of no use: it has {_has(run)}" for run in useless}
     for words in sorted(told):
@@ -139,6 +157,7 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
             f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
             f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
             + "".join(f"; {note}" for note in faults.notes if note not in told)
+            + "".join(f"; {inventory(bag, meta)}" for bag in bags[:1])
         )
 
 

@@ -16,7 +16,7 @@ from kurumaisu.errors import Error
 from kurumaisu.names import hint
 from kurumaisu.types import FloatArray
 
-_JOINTS = "sensor_msgs/msg/JointState"
+JOINTS = "sensor_msgs/msg/JointState"
 
 
 def read_wheels(path: Path, wheels: Wheels) -> tuple[FloatArray, FloatArray]:
@@ -46,7 +46,7 @@ def _joints(path: Path, wheels: Wheels) -> tuple[FloatArray, FloatArray, FloatAr
         return None if None in sides else tuple(value for side in sides if side is not None for value in side)
 
     def converter(kind: str) -> Any:
-        if kind != _JOINTS:
+        if kind != JOINTS:
             raise Error(f"is of type {kind.replace('/msg/', '/')}, not of sensor_msgs/JointState")
         return convert
 
