@@ -14,6 +14,7 @@ from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, read_queries
+from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
 from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
@@ -24,11 +25,12 @@ from kurumaisu.names import hint
 META = "meta.yaml"
 
 
-def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
+def read_recording(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Recording:
     """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
 
     NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
     wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
+    excerpt: what of each run is used.
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
@@ -39,6 +41,7 @@ def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
     kept = chosen(sources(path), wanted)
     for source in kept:
         run, mount = read_run(source, meta, faults)
+        run = cut(run, excerpt, faults)
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
