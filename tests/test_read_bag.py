@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Bags: they must say the same as CSV, and what is wrong must be said."""
 
+import dataclasses
+import sqlite3
+
+import mcap.writer
 import numpy as np
 import pytest
 from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
@@ -12,6 +16,23 @@ from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
+CONTAINERS = pytest.mark.parametrize(
+    ("name", "how"),
+    {
+        "sqlite3": ("run_1", {"ros": 2}),
+        "sqlite3, messages packed": ("run_1", {"ros": 2, "compression": CompressionMode.MESSAGE}),
+        "sqlite3, file packed": ("run_1", {"ros": 2, "compression": CompressionMode.FILE}),
+        "mcap of ros2 bag": ("run_1", {"ros": 2, "storage": "MCAP"}),
+        "mcap of ros2 bag, packed": (
+            "run_1",
+            {"ros": 2, "storage": "MCAP", "compression": CompressionMode.STORAGE},
+        ),
+        "mcap with ros 1": ("run_1.mcap", {"ros": 1, "compression": "LZ4"}),
+        "mcap with ros 2": ("run_1.mcap", {"ros": 2, "compression": "ZSTD"}),
+        "mcap, not packed": ("run_1.mcap", {"ros": 2}),
+    }.values(),
+    ids=str,
+)
 META = "topics: {ground_truth: /mocap/pose, tyre: /tyre_pressure}\n"
 
 
@@ -33,23 +54,7 @@ def test_a_bag_says_the_same_as_csv(tmp_path, compression, start):
     assert by_bag.runs[0].fan.beams == BEAMS
 
 
-@pytest.mark.parametrize(
-    ("name", "how"),
-    {
-        "sqlite3": ("run_1", {"ros": 2}),
-        "sqlite3, messages packed": ("run_1", {"ros": 2, "compression": CompressionMode.MESSAGE}),
-        "sqlite3, file packed": ("run_1", {"ros": 2, "compression": CompressionMode.FILE}),
-        "mcap of ros2 bag": ("run_1", {"ros": 2, "storage": "MCAP"}),
-        "mcap of ros2 bag, packed": (
-            "run_1",
-            {"ros": 2, "storage": "MCAP", "compression": CompressionMode.STORAGE},
-        ),
-        "mcap with ros 1": ("run_1.mcap", {"ros": 1, "compression": "LZ4"}),
-        "mcap with ros 2": ("run_1.mcap", {"ros": 2, "compression": "ZSTD"}),
-        "mcap, not packed": ("run_1.mcap", {"ros": 2}),
-    }.values(),
-    ids=str,
-)
+@CONTAINERS
 def test_every_container_says_the_same_as_csv(tmp_path, name, how):
     run = full_run(start=1.7e9)
     (tmp_path / "meta.yaml").write_text(META)
@@ -156,21 +161,85 @@ def test_a_cut_bag_is_an_error_not_a_traceback(tmp_path):
 
 def test_damage_anywhere_in_a_bag_is_an_error_that_names_it_or_harmless(tmp_path):
     write_bag(tmp_path / "whole.bag", full_run())
-    data = bytearray((tmp_path / "whole.bag").read_bytes())
+    (tmp_path / "whole.bag").rename(tmp_path / "damaged.bag")
+    assert all("damaged.bag" in message for message in refusals_of_damage(tmp_path / "damaged.bag", tmp_path, 40))
+
+
+@CONTAINERS
+def test_damage_in_any_container_is_an_error_that_names_it_or_harmless(tmp_path, name, how):
+    """And a file that was cut, wherever it was, is never read as if it had been whole."""
+    (tmp_path / "meta.yaml").write_text(META)
+    write_bag(tmp_path / name, full_run(), **how)
+    folder = tmp_path / name
+    for path in [folder] if folder.is_file() else sorted(folder.iterdir()):
+        assert all(name in message for message in refusals_of_damage(path, tmp_path, 6))
+        data = path.read_bytes()
+        for size in (0, 10, len(data) // 2, len(data) - 12) if path.suffix != ".yaml" else (0, len(data) // 2):
+            path.write_bytes(data[:size])
+            with pytest.raises(Error, match=rf"{name}"):
+                read_recording(tmp_path)
+        path.write_bytes(data)
+
+
+def refusals_of_damage(path, recording, count):
+    """Damage a file in so many ways, and return what was said of those that could not be read."""
+    data = bytearray(path.read_bytes())
     rng = np.random.default_rng(7)
-    path = tmp_path / "damaged.bag"
     messages = []
-    for _ in range(40):
+    for _ in range(count):
         damaged = data.copy()
         for at in rng.integers(0, len(data), 30):
             damaged[at] = rng.integers(256)
         path.write_bytes(damaged)
         try:
-            read_recording(path)
+            read_recording(recording)
         except Error as error:
             messages.append(str(error))
+    path.write_bytes(data)
     assert messages
-    assert all("damaged.bag" in message for message in messages)
+    return messages
+
+
+def test_what_a_recorder_left_beside_its_database_is_not_lost(tmp_path):
+    write_bag(tmp_path / "run_1", full_run(), ros=2)
+    (tmp_path / "run_1" / "run_1.db3-wal").write_bytes(b"messages")
+    with pytest.raises(Error, match=r"run_1\.db3: was not closed: run_1\.db3-wal holds messages; sqlite3 "):
+        read_recording(tmp_path)
+
+
+def test_a_file_that_metadata_names_must_be_there_and_lies_in_the_bag(tmp_path):
+    write_bag(tmp_path / "run_1", full_run(), ros=2)
+    metadata = tmp_path / "run_1" / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("run_1.db3", "../../etc/passwd"))
+    with pytest.raises(Error, match=r"run_1/passwd: No such file or directory"):
+        read_recording(tmp_path)
+
+
+def test_bags_before_iron_carry_no_definitions(tmp_path):
+    write_bag(tmp_path / "run_1", full_run(), ros=2)
+    database = sqlite3.connect(tmp_path / "run_1" / "run_1.db3")
+    database.executescript("DROP TABLE message_definitions; UPDATE schema SET schema_version = 3;")
+    database.close()
+    (tmp_path / "meta.yaml").write_text(META)
+    with pytest.raises(Error, match=r"/voltages: the bag has no definition of its type kurumaisu/Voltages"):
+        read_recording(tmp_path)
+    (tmp_path / "meta.yaml").write_text("topics: {ground_truth: /mocap/pose, tyre: /tyre_pressure, voltages: /none}\n")
+    run = dataclasses.replace(read_recording(tmp_path).runs[0], voltage=full_run().voltage)
+    assert_same(full_run(), run, atol=1e-12)
+
+
+def test_messages_that_are_none_of_ros_are_told_by_topic(tmp_path):
+    with (tmp_path / "drive.mcap").open("wb") as file:
+        writer = mcap.writer.Writer(file)
+        writer.start()
+        schema = writer.register_schema("foxglove.PoseInFrame", "jsonschema", b"{}")
+        channel = writer.register_channel("/ground_truth", "json", schema)
+        writer.add_message(channel, 1, b"{}", 1)
+        writer.finish()
+    with pytest.raises(
+        Error, match=r"drive\.mcap: /ground_truth: its messages are encoded as 'json', not as those of ROS"
+    ):
+        read_recording(tmp_path / "drive.mcap")
 
 
 def poses_of(tmp_path, make):

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rosbags.interfaces import Connection, ConnectionExtRosbag1, MessageDefinitionFormat
+from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2, MessageDefinitionFormat
 from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
 
 _HEADER = "std_msgs/msg/Header"
 _RULE = "=" * 80 + "\n"  # between the definitions of IDL
@@ -25,6 +25,9 @@ def decoder(path: Path, connection: Connection) -> Callable[[bytes], Any]:
     """
     kind = connection.msgtype
     ros1 = isinstance(connection.ext, ConnectionExtRosbag1)
+    if isinstance(connection.ext, ConnectionExtRosbag2) and connection.ext.serialization_format != "cdr":
+        encoding = told(connection.ext.serialization_format)
+        raise Error(f"{path}: {connection.topic}: its messages are encoded as {encoding}, not as those of ROS")
     store = get_typestore(Stores.EMPTY)
     if connection.msgdef.format == MessageDefinitionFormat.NONE:
         store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)

@@ -53,7 +53,7 @@ class McapFile:
         return ReaderMetadata(duration, self.start_time, self.end_time, count, None, None, None, None)
 
     def open(self) -> None:
-        """Find the channels; those that hold no messages of ROS are left out."""
+        """Find the channels; some may hold messages that are none of ROS."""
         schemas: dict[int, Schema] = {}
         channels: dict[int, Channel] = {}
         counts: Counter[int] = Counter()
@@ -69,7 +69,6 @@ class McapFile:
         self.connections = [
             self._connection(channel, schemas.get(channel.schema_id), counts[channel.id])
             for channel in channels.values()
-            if channel.message_encoding in (_ROS1, _ROS2)
         ]
 
     def close(self) -> None:
@@ -122,13 +121,13 @@ class McapFile:
     def _connection(self, channel: Channel, schema: Schema | None, count: int) -> Connection:
         kind, definition = "", MessageDefinition(MessageDefinitionFormat.NONE, "")
         if schema is not None:
-            kind = normalize_msgtype(schema.name)
+            kind = normalize_msgtype(schema.name) if channel.message_encoding in (_ROS1, _ROS2) else schema.name
             if schema.encoding in _FORMATS:
                 definition = MessageDefinition(_FORMATS[schema.encoding], schema.data.decode())
+        qos = channel.metadata.get("offered_qos_profiles", "")
         ext: ConnectionExtRosbag1 | ConnectionExtRosbag2 = ConnectionExtRosbag1(None, None)
-        if channel.message_encoding == _ROS2:
-            qos = channel.metadata.get("offered_qos_profiles", "")
-            ext = ConnectionExtRosbag2(_ROS2, parse_qos(qos) if qos else [])
+        if channel.message_encoding != _ROS1:
+            ext = ConnectionExtRosbag2(channel.message_encoding, parse_qos(qos) if qos else [])
         return Connection(channel.id, channel.topic, kind, definition, "", count, ext, self)
 
 
