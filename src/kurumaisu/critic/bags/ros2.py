@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Collection, Generator
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from kurumaisu.critic.bags.mcap_file import McapFile
 from kurumaisu.errors import Error
 
 METADATA = "metadata.yaml"
+_HEAD = struct.Struct(">16xH10xI")  # of an SQLite file: bytes of a page, 1 for 65536, and how many pages
 _PIECE = 2**20  # [bytes] unpacked at a time
 
 
@@ -28,13 +30,14 @@ class Database(Sqlite3Reader):
     path: Path
 
     def open(self) -> None:
-        """Open. Raise Error for a file beside which the recorder left messages."""
+        """Open. Raise Error for a file that was cut, or beside which the recorder left messages."""
         waiting = self.path.with_name(f"{self.path.name}-wal")
         if waiting.exists() and waiting.stat().st_size:
             raise Error(
                 f"{self.path}: was not closed: {waiting.name} holds messages; "
                 f"sqlite3 {self.path.name} 'PRAGMA wal_checkpoint(TRUNCATE)' puts them in"
             )
+        _check_whole(self.path)
         super().open()
 
     def __enter__(self) -> Database:
@@ -106,6 +109,17 @@ class Ros2Bag(DirectoryReader):
         for place, (connection, received, data) in enumerate(super().messages(connections, start, stop)):
             packed = self._messages_are_packed
             yield connection, received, self._unpacker.unpack("zstd", data, place) if packed else data
+
+
+def _check_whole(path: Path) -> None:
+    """Raise Error for a database of fewer pages than its head counts: SQLite would read zeros there."""
+    with path.open("rb") as file:
+        head = file.read(_HEAD.size)
+    if len(head) == _HEAD.size:
+        page, pages = _HEAD.unpack(head)
+        size, expected = path.stat().st_size, pages * (65536 if page == 1 else page)
+        if size < expected:
+            raise Error(f"{path}: is cut: it has {size} of {expected} bytes")
 
 
 def _files(path: Path) -> list[tuple[Path, str]]:
