@@ -2,6 +2,7 @@
 """A made-up drive, and how to write it as a bag, for the tests of the readers."""
 
 import dataclasses
+import struct
 from decimal import Decimal
 from pathlib import Path
 
@@ -71,13 +72,44 @@ class Mcap:
         self.file.close()
 
 
+class OldBag:
+    """Writes bags of format 1.2 by its specification: no library does any more, but that of ROS 1 reads them."""
+
+    def __init__(self, path):
+        self.file = path.open("wb")
+        self.file.write(b"#ROSBAG V1.2\n")
+        self.known = set()
+
+    def add_connection(self, topic, kind, typestore):
+        text, md5 = typestore.generate_msgdef(kind)
+        named = {"topic": topic.encode(), "type": kind.replace("/msg/", "/").encode(), "md5": md5.encode()}
+        return {**named, "def": text.encode()}
+
+    def write(self, fields, received, data):
+        if fields["topic"] not in self.known:
+            self.record({"op": b"\x01", **fields}, b"")
+            self.known.add(fields["topic"])
+        named = {name: value for name, value in fields.items() if name != "def"}
+        times = {"sec": struct.pack("<I", received // 10**9), "nsec": struct.pack("<I", received % 10**9)}
+        self.record({"op": b"\x02", **named, **times}, bytes(data))
+
+    def record(self, fields, data):
+        whole = [name.encode() + b"=" + value for name, value in fields.items()]
+        head = b"".join(struct.pack("<I", len(field)) + field for field in whole)
+        self.file.write(struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data)
+
+    def close(self):
+        self.file.close()
+
+
 class Bag:
     """Writes messages with the serialisers and writers of rosbags and mcap.
 
     ros: 1 or 2, of the messages. path: .bag, .mcap, or for a folder of ROS 2 any other, with the storage of that name.
+    old: in format 1.2.
     """
 
-    def __init__(self, path, compression=None, ros=1, storage="SQLITE3"):
+    def __init__(self, path, compression=None, ros=1, storage="SQLITE3", old=False):
         self.ros = ros
         self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_JAZZY)
         text = (PACKAGE / "msg" / "Voltages.msg").read_text(encoding="utf-8")
@@ -88,6 +120,9 @@ class Bag:
         self.connections = {}
         if path.suffix == ".mcap":
             self.writer = Mcap(path, self.store, ros, compression)
+            return
+        if old:
+            self.writer = OldBag(path)
             return
         if ros == 1:
             self.writer = rosbag1.Writer(path)

@@ -7,6 +7,7 @@ import sqlite3
 import mcap.writer
 import numpy as np
 import pytest
+import rosbag
 from recordings import BEAMS, PACKAGE, Bag, assert_same, full_run, write_bag
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import CompressionMode
@@ -19,6 +20,7 @@ from kurumaisu.errors import Error
 CONTAINERS = pytest.mark.parametrize(
     ("name", "how"),
     {
+        "format 1.2": ("run_1.bag", {"old": True}),
         "sqlite3": ("run_1", {"ros": 2}),
         "sqlite3, messages packed": ("run_1", {"ros": 2, "compression": CompressionMode.MESSAGE}),
         "sqlite3, file packed": ("run_1", {"ros": 2, "compression": CompressionMode.FILE}),
@@ -64,6 +66,16 @@ def test_every_container_says_the_same_as_csv(tmp_path, name, how):
     assert recording.train == ("run_1",)
     assert_same(run, recording.runs[0], atol=1e-12)
     np.testing.assert_array_equal(recording.runs[0].scan.values, run.scan.values)
+
+
+def test_a_bag_of_format_1_2_is_one_to_ros_too(tmp_path):
+    write_bag(tmp_path / "run_1.bag", full_run(), old=True)
+    with rosbag.Bag(str(tmp_path / "run_1.bag"), allow_unindexed=True) as bag:
+        assert bag.version == 102
+        stamped = [message for topic, message, _ in bag.read_messages() if topic == "/cmd_vel"]
+    twists = [(message.header.stamp.to_sec(), message.twist.linear.x) for message in stamped]
+    command = read_recording(tmp_path).runs[0].command
+    np.testing.assert_allclose(twists, np.stack([command.t, command.column("v")], axis=1))
 
 
 def test_a_file_of_a_ros2_bag_is_read_alone(tmp_path):

@@ -13,6 +13,7 @@ from rosbags.interfaces import Connection
 from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.bags.mcap_file import McapFile
 from kurumaisu.critic.bags.ros1 import Ros1Bag
+from kurumaisu.critic.bags.ros1_old import MAGIC, OldRos1Bag
 from kurumaisu.critic.bags.ros2 import METADATA, Database, Ros2Bag
 
 SUFFIXES = (".bag", ".mcap", ".db3")
@@ -67,8 +68,14 @@ def opened(path: Path) -> Bag:
     if path.is_dir():
         return Ros2Bag(path)
     check_file(path, MOST_RECORDING)
-    readers: dict[str, Callable[[Path], Bag]] = {".bag": Ros1Bag, ".mcap": McapFile, ".db3": Database}
+    readers: dict[str, Callable[[Path], Bag]] = {".bag": _ros1, ".mcap": McapFile, ".db3": Database}
     return readers[path.suffix](path)
+
+
+def _ros1(path: Path) -> Bag:
+    with path.open("rb") as file:
+        old = file.read(len(MAGIC)) == MAGIC
+    return OldRos1Bag(path) if old else Ros1Bag(path)
 
 
 def broken(path: Path) -> str:
