@@ -10,7 +10,7 @@ from pathlib import Path
 
 from kurumaisu.critic.bags.containers import SUFFIXES, is_bag
 from kurumaisu.critic.data.csv_reader import is_csv_run
-from kurumaisu.critic.data.rawlog_reader import is_rawlog
+from kurumaisu.critic.data.reading import is_log
 from kurumaisu.errors import Error
 
 META = "meta.yaml"
@@ -39,7 +39,7 @@ def names(found: Sequence[Path]) -> list[str]:
 
 
 def _bare(path: Path) -> Path:
-    while path.suffix in (*SUFFIXES, ".rawlog", ".gz"):
+    while path.suffix in (*SUFFIXES, ".rawlog", ".gz", ".clf", ".log"):
         path = path.with_suffix("")
     return path
 
@@ -52,7 +52,7 @@ def _inside(path: Path, output: Path) -> list[Path]:
     folders = [item for item in items if item.is_dir() and item.resolve() != output.resolve()]
     if not any(_is_recording(folder) for folder in folders):
         return [path]
-    return sorted([*folders, *(item for item in items if item.is_file() and (is_bag(item) or is_rawlog(item)))])
+    return sorted([*folders, *(item for item in items if item.is_file() and (is_bag(item) or is_log(item)))])
 
 
 def _is_recording(folder: Path) -> bool:
@@ -62,5 +62,5 @@ def _is_recording(folder: Path) -> bool:
     if is_bag(folder):
         return False
     inside = sorted(folder.iterdir())
-    runs = any(is_bag(item) or is_rawlog(item) or (item.is_dir() and is_csv_run(item)) for item in inside)
+    runs = any(is_bag(item) or is_log(item) or (item.is_dir() and is_csv_run(item)) for item in inside)
     return runs and not is_csv_run(folder)

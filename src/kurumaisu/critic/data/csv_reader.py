@@ -15,6 +15,7 @@ import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
 from kurumaisu.types import FloatArray
@@ -34,6 +35,7 @@ REQUIRED: dict[str, tuple[str, ...]] = {
 # Columns that belong to a table when it has them; any other one is a covariate.
 OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w"), "pose": ("theta",), "odom": ("v", "w")}
 QUERY = "query"
+_TRAJECTORIES = ("pose", "odom")  # which may also be trajectories
 _HEADINGS = frozenset({"yaw", "heading", "th", "phi", "psi", "angle", "orientation", "rotation", "bearing"})
 _MOST_COLUMNS = 20_000  # of a table; a laser has some thousand beams
 _LONGEST_NAME = 200  # characters of a column's name
@@ -42,7 +44,8 @@ _MOST_LISTED = 20  # names of columns in a message
 
 def is_csv_run(folder: Path) -> bool:
     """Tell whether a folder holds a table of a run."""
-    return any((folder / f"{name}.csv").is_file() for name in (*REQUIRED, QUERY))
+    tables = any((folder / f"{name}.csv").is_file() for name in (*REQUIRED, QUERY))
+    return tables or any((folder / f"{name}{SUFFIX}").is_file() for name in _TRAJECTORIES)
 
 
 def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
@@ -61,6 +64,13 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
         if path.exists():
             parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
             _merge(covariates, more, path)
+    for part in _TRAJECTORIES:
+        path = folder / f"{part}{SUFFIX}"
+        if path.exists():
+            if part in parts:
+                raise Error(f"{path}: there is a {part}.csv, too: one or the other")
+            t, rows = read_tum(path)
+            parts[part] = clean(Table(f"{name}/{path.name}", t, rows, ("x", "y", "theta"), "row", 1), faults)
     query = folder / f"{QUERY}.csv"
     return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.exists() else None)
 

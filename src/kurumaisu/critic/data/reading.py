@@ -10,6 +10,7 @@ from pathlib import Path
 from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.data.bag_reader import PutAside, inventory, read_bag_run, resolve
+from kurumaisu.critic.data.carmen_reader import is_carmen, read_carmen_run
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run, usable
@@ -26,7 +27,7 @@ META = "meta.yaml"
 
 
 def read_recording(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Recording:
-    """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
+    """Read a folder of runs, one folder of CSV tables, one bag or one log.
 
     NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
     wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
@@ -51,6 +52,11 @@ def read_recording(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WH
     return recording_of_meta(name, runs, replace(meta, laser=laser), faults, train=train, test=test)
 
 
+def is_log(path: Path) -> bool:
+    """Tell whether a file is a rawlog or a log of CARMEN."""
+    return is_rawlog(path) or is_carmen(path)
+
+
 def meta_of(path: Path) -> Meta:
     """Return what meta.yaml says of a recording: the one inside a folder, else the one beside a bag or a rawlog.
 
@@ -62,20 +68,21 @@ def meta_of(path: Path) -> Meta:
     inside, beside = path / META, path.resolve().parent / META
     if path.is_dir() and inside.exists():
         return read_meta(inside)
-    alone = is_split(path) or is_bag(path) or is_rawlog(path)
+    alone = is_split(path) or is_bag(path) or is_log(path)
     return replace(read_meta(beside), train=(), test=()) if alone and beside.exists() else Meta()
 
 
 def sources(path: Path) -> list[Path]:
-    """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
+    """Return what each run is read from: a bag, a log, or a folder of tables."""
     if is_bag(path):
         return [path]
     if not path.is_dir():
-        if not is_rawlog(path):
-            raise Error(f"{path}: is not a recording: give a folder, a bag ({', '.join(SUFFIXES)}) or a .rawlog")
+        if not is_log(path):
+            kinds = f"a bag ({', '.join(SUFFIXES)}), a .rawlog or a log of CARMEN (.clf, .log)"
+            raise Error(f"{path}: is not a recording: give a folder, {kinds}")
         return [path]
     inside = sorted(path.iterdir())
-    bags = [item for item in inside if is_bag(item) or is_rawlog(item)]
+    bags = [item for item in inside if is_bag(item) or is_log(item)]
     folders = [item for item in inside if item.is_dir() and item not in bags and is_csv_run(item)]
     if is_csv_run(path):
         if bags or folders:
@@ -92,7 +99,7 @@ def sources(path: Path) -> list[Path]:
     if twice:
         raise Error(f"{path}: the run {twice[0]} exists twice")
     if not bags and not folders:
-        raise Error(f"{path}: holds no run: neither a bag, nor a .rawlog, nor a folder with tables like pose.csv")
+        raise Error(f"{path}: holds no run: neither a bag, nor a log, nor a folder with tables like pose.csv")
     return sorted(bags + folders, key=lambda item: item.stem)
 
 
@@ -109,6 +116,8 @@ def _read(source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None) 
         return read_csv_run(source, source.resolve().name, faults), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
+    if is_carmen(source):
+        return read_carmen_run(source, faults)
     run = read_bag_run(source, meta, faults, put_aside)
     queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
