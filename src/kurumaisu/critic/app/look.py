@@ -179,7 +179,7 @@ def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
 
 def _parser() -> argparse.ArgumentParser:
     parser = program.Parser(prog="critic look", description=_DESCRIPTION, allow_abbrev=False)
-    what = "a bag, a folder of runs or CSV tables, or an MRPT rawlog"
+    what = "a bag, a folder of runs or CSV tables, or a log of MRPT or CARMEN"
     parser.add_argument("recording", type=Path, metavar="RECORDING", help=what)
     words = "only these runs; patterns like drive_* are allowed"
     parser.add_argument("--runs", type=name_list, default=(), metavar="A,B", help=words)

@@ -59,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="critic", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
     )
     add = parser.add_argument
-    what = "a bag, a folder of runs or CSV tables, an MRPT rawlog, or a folder of such recordings"
+    what = "a bag, a folder of runs or CSV tables, a log of MRPT or CARMEN, or a folder of such recordings"
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="output folder (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
