@@ -152,7 +152,7 @@ def test_a_bag_has_what_critic_and_mapping_need_and_each_part_can_be_read_alone(
 
 
 def test_the_base_run_again_goes_where_it_went(drive, tmp_path):
-    for attempt in range(3):  # a computer that keeps commands back for longer than the base waits makes it brake between
+    for attempt in range(3):  # a busy computer keeps commands back, and the base brakes
         out = tmp_path / f"again{attempt}.bag"
         replay(parts_of(drive), out)
         with rosbag.Bag(out) as both:
