@@ -101,6 +101,7 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"rostopic echo -n 1 /sim_node/effects"),
         Step(r"dynparam set /sim_node/live base_lag_v_enabled false"),
         End(r"roslaunch kurumaisu sim\.launch viewer:=true"),
+        Step(r"critic look RECORDING$"),
         Step(r"critic RECORDING$|critic drive\.bag", codes=_VERDICTS_LIVE),
         Step(r"kurumaisu map RECORDING"),
         Step(r"kurumaisu view RECORDING$", says="http://"),

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A made-up drive, and how to write it as a bag, for the tests of the readers."""
 
+import dataclasses
+import struct
 from decimal import Decimal
 from pathlib import Path
 
+import mcap.writer
 import numpy as np
-from rosbags.rosbag1 import Writer
+from rosbags import rosbag1, rosbag2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from kurumaisu.critic.values.recording import Run, Series
@@ -45,18 +48,92 @@ def nanoseconds(t):
     return int(Decimal(repr(float(t))) * 10**9)
 
 
-class Bag:
-    """Writes a run's parts as messages, with the rosbags library's own serialiser."""
+class Mcap:
+    """The mcap library's writer, called as those of rosbags are."""
 
-    def __init__(self, path, compression=None):
-        self.store = get_typestore(Stores.ROS1_NOETIC)
+    def __init__(self, path, store, ros, compression):
+        self.file = path.open("wb")
+        self.store, self.ros = store, ros
+        packed = mcap.writer.CompressionType[compression or "NONE"]
+        self.writer = mcap.writer.Writer(self.file, compression=packed, chunk_size=4096)
+        self.writer.start(profile=f"ros{ros}")
+
+    def add_connection(self, topic, kind, typestore):
+        text, _ = typestore.generate_msgdef(kind, ros_version=self.ros)
+        name = kind.replace("/msg/", "/") if self.ros == 1 else kind
+        schema = self.writer.register_schema(name, f"ros{self.ros}msg", text.encode())
+        return self.writer.register_channel(topic, "ros1" if self.ros == 1 else "cdr", schema)
+
+    def write(self, channel, received, data):
+        self.writer.add_message(channel, received, bytes(data), received)
+
+    def close(self):
+        self.writer.finish()
+        self.file.close()
+
+
+class OldBag:
+    """Writes bags of format 1.2 by its specification: no library does any more, but that of ROS 1 reads them."""
+
+    def __init__(self, path):
+        self.file = path.open("wb")
+        self.file.write(b"#ROSBAG V1.2\n")
+        self.known = set()
+
+    def add_connection(self, topic, kind, typestore):
+        text, md5 = typestore.generate_msgdef(kind)
+        named = {"topic": topic.encode(), "type": kind.replace("/msg/", "/").encode(), "md5": md5.encode()}
+        return {**named, "def": text.encode()}
+
+    def write(self, fields, received, data):
+        if fields["topic"] not in self.known:
+            self.record({"op": b"\x01", **fields}, b"")
+            self.known.add(fields["topic"])
+        named = {name: value for name, value in fields.items() if name != "def"}
+        times = {"sec": struct.pack("<I", received // 10**9), "nsec": struct.pack("<I", received % 10**9)}
+        self.record({"op": b"\x02", **named, **times}, bytes(data))
+
+    def record(self, fields, data):
+        whole = [name.encode() + b"=" + value for name, value in fields.items()]
+        head = b"".join(struct.pack("<I", len(field)) + field for field in whole)
+        self.file.write(struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data)
+
+    def close(self):
+        self.file.close()
+
+
+class Bag:
+    """Writes messages with the serialisers and writers of rosbags and mcap.
+
+    ros: 1 or 2, of the messages. path: .bag, .mcap, or for a folder of ROS 2 any other, with the storage of that name.
+    old: in format 1.2.
+    """
+
+    def __init__(self, path, compression=None, ros=1, storage="SQLITE3", old=False):
+        self.ros = ros
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_JAZZY)
         text = (PACKAGE / "msg" / "Voltages.msg").read_text(encoding="utf-8")
         self.store.register(get_types_from_msg(text, "kurumaisu/msg/Voltages"))
-        self.writer = Writer(path)
-        if compression:
-            self.writer.set_compression(compression)
-        self.writer.open()
+        if ros == 1:
+            text = "geometry_msgs/TransformStamped[] transforms"
+            self.store.register(get_types_from_msg(text, "tf2_msgs/msg/TFMessage"))
         self.connections = {}
+        if path.suffix == ".mcap":
+            self.writer = Mcap(path, self.store, ros, compression)
+            return
+        if old:
+            self.writer = OldBag(path)
+            return
+        if ros == 1:
+            self.writer = rosbag1.Writer(path)
+            if compression:
+                self.writer.set_compression(compression)
+        else:
+            plugin = rosbag2.StoragePlugin[storage]
+            self.writer = rosbag2.Writer(path, version=9, storage_plugin=plugin)
+            if compression:
+                self.writer.set_compression(compression, rosbag2.CompressionFormat.ZSTD)
+        self.writer.open()
 
     def make(self, kind, **values):
         return self.store.types[kind](**values)
@@ -64,13 +141,14 @@ class Bag:
     def header(self, t):
         ns = nanoseconds(t)
         stamp = self.make("builtin_interfaces/msg/Time", sec=ns // 10**9, nanosec=ns % 10**9)
-        return self.make("std_msgs/msg/Header", seq=0, stamp=stamp, frame_id="map")
+        counted = {"seq": 0} if self.ros == 1 else {}
+        return self.make("std_msgs/msg/Header", **counted, stamp=stamp, frame_id="map")
 
     def write(self, topic, message, received):
         kind = message.__msgtype__
         if topic not in self.connections:
             self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.store)
-        data = self.store.serialize_ros1(message, kind)
+        data = (self.store.serialize_ros1 if self.ros == 1 else self.store.serialize_cdr)(message, kind)
         self.writer.write(self.connections[topic], nanoseconds(received), data)
 
     def vector(self, x=0.0, y=0.0, z=0.0, kind="Vector3"):
@@ -85,6 +163,42 @@ class Bag:
 
     def pose_stamped(self, t, pose):
         return self.make("geometry_msgs/msg/PoseStamped", header=self.header(t), pose=self.pose(*pose))
+
+    def pose_with_covariance(self, t, pose):
+        posed = self.make("geometry_msgs/msg/PoseWithCovariance", pose=self.pose(*pose), covariance=np.zeros(36))
+        return self.make("geometry_msgs/msg/PoseWithCovarianceStamped", header=self.header(t), pose=posed)
+
+    def transform(self, t, parent, child, pose):
+        posed = self.pose(*pose)
+        moved = self.vector(posed.position.x, posed.position.y)
+        return self.make(
+            "geometry_msgs/msg/TransformStamped",
+            header=dataclasses.replace(self.header(t), frame_id=parent),
+            child_frame_id=child,
+            transform=self.make("geometry_msgs/msg/Transform", translation=moved, rotation=posed.orientation),
+        )
+
+    def transforms(self, *transforms):
+        return self.make("tf2_msgs/msg/TFMessage", transforms=list(transforms))
+
+    def point_stamped(self, t, x, y):
+        return self.make("geometry_msgs/msg/PointStamped", header=self.header(t), point=self.vector(x, y, kind="Point"))
+
+    def fix(self, t, latitude, longitude):
+        return self.make(
+            "sensor_msgs/msg/NavSatFix",
+            header=self.header(t),
+            status=self.make("sensor_msgs/msg/NavSatStatus", status=0, service=1),
+            latitude=latitude,
+            longitude=longitude,
+            altitude=300.0,
+            position_covariance=np.zeros(9),
+            position_covariance_type=0,
+        )
+
+    def joints(self, t, names, angles, rates):
+        values = {"position": np.array(angles), "velocity": np.array(rates), "effort": np.zeros(0)}
+        return self.make("sensor_msgs/msg/JointState", header=self.header(t), name=names, **values)
 
     def odometry(self, t, pose, v, w):
         none = np.zeros(36)
@@ -141,9 +255,9 @@ class Bag:
         )
 
 
-def write_bag(path, run, *, compression=None, stamped=True, late=0.0, slash="/"):
+def write_bag(path, run, *, compression=None, stamped=True, late=0.0, slash="/", **how):
     """Write a full run; late: how long after the stamp a message is received [s]; slash: what topics begin with."""
-    bag = Bag(path, compression)
+    bag = Bag(path, compression, **how)
     to_message = {
         "/voltages": (run.voltage, lambda t, row: bag.voltages(t, *row)),
         "/mocap/pose": (run.pose, bag.pose_stamped),

@@ -53,7 +53,7 @@ def test_a_verdict_from_arrays(size, verdict, causes):
 @pytest.mark.parametrize(
     ("tables", "message"),
     [
-        ({"pose": np.zeros((5, 3))}, "run/pose: must have the columns t, x, y, theta; it has 3 columns"),
+        ({"pose": np.zeros((5, 2))}, "run/pose: must have the columns t, x, y; it has 2 columns"),
         ({"pose": np.zeros(5)}, r"run/pose: must have rows of t .* its shape is \(5,\)"),
         ({"pose": [["a", 1.0]]}, "run/pose: is not an array of numbers"),
         ({"tyre": np.zeros((5, 3))}, "run/tyre: must have the columns t, tyre"),

@@ -12,11 +12,12 @@ from pathlib import Path
 import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 from recordings import full_run, write_bag
 from rosbags.rosbag1 import Writer
-from rosbags.rosbag1.reader import Compression, decompressors
+from rosbags.rosbag2 import CompressionMode
 
-from kurumaisu.critic.data import bag_topics
+from kurumaisu.critic.bags import limits, ros2
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error, told
@@ -175,24 +176,40 @@ def test_hostile_meta_is_refused_in_few_words(tmp_path, text, words):
     assert words in refusal(folder)
 
 
-@pytest.mark.parametrize("compression", [Writer.CompressionFormat.BZ2, Writer.CompressionFormat.LZ4])
-def test_a_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch, compression):
-    write_bag(tmp_path / "a.bag", full_run(), compression=compression)
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        ("a.bag", {"compression": Writer.CompressionFormat.BZ2}),
+        ("a.bag", {"compression": Writer.CompressionFormat.LZ4}),
+        ("a.mcap", {"compression": "LZ4"}),
+        ("a.mcap", {"compression": "ZSTD"}),
+        ("a", {"ros": 2, "compression": CompressionMode.MESSAGE}),
+    ],
+    ids=["bz2", "lz4", "mcap lz4", "mcap zstd", "messages"],
+)
+def test_a_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch, name, how):
+    write_bag(tmp_path / name, full_run(), **how)
     assert read_recording(tmp_path).runs
-    monkeypatch.setattr(bag_topics, "_LEAST_UNPACKED", 100)
-    monkeypatch.setattr(bag_topics, "_TIMES_UNPACKED", 1)
-    assert "a.bag: has more than" in refusal(tmp_path)
-    monkeypatch.setattr(bag_topics, "_MOST_UNPACKED", 1000)
-    assert "a.bag: a chunk has more than 1000 bytes unpacked" in refusal(tmp_path)
+    monkeypatch.setattr(limits, "LEAST_UNPACKED", 100)
+    monkeypatch.setattr(limits, "TIMES_UNPACKED", 0)
+    assert f"{name}: has more than" in refusal(tmp_path)
+    monkeypatch.setattr(limits, "MOST_UNPACKED", 50)
+    assert f"{name}: a chunk has more than 50 bytes unpacked" in refusal(tmp_path)
 
 
-@pytest.mark.parametrize("kind", ["bz2", "lz4"])
+def test_a_file_of_a_ros2_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch):
+    write_bag(tmp_path / "a", full_run(), ros=2, compression=CompressionMode.FILE)
+    monkeypatch.setattr(ros2, "LEAST_UNPACKED", 100)
+    monkeypatch.setattr(ros2, "TIMES_UNPACKED", 1)
+    assert "a.db3.zstd: has more than" in refusal(tmp_path)
+
+
+@pytest.mark.parametrize("kind", ["bz2", "lz4", "zstd"])
 def test_a_bomb_is_not_unpacked(kind):
-    pack, wanted = (bz2.compress, Compression.BZ2) if kind == "bz2" else (lz4.frame.compress, Compression.LZ4)
-    unpack = bag_topics._UNPACKERS[decompressors[wanted.value]]
+    pack = {"bz2": bz2.compress, "lz4": lz4.frame.compress, "zstd": zstandard.compress}[kind]
     bomb = pack(bytes(100_000_000))
     assert len(bomb) < 500_000
-    assert len(unpack(bomb, 10_000)) == 10_000
+    assert len(limits.UNPACKERS[kind](bomb, 10_000)) == 10_000
 
 
 def test_values_are_told_in_few_characters():

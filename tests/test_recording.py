@@ -8,6 +8,7 @@ import pytest
 from recordings import BEAMS, PACKAGE, assert_same, full_run, series
 
 from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.excerpt import Excerpt, gap, moment
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error
@@ -67,6 +68,48 @@ def test_a_missing_column_is_named(folder):
     rewrite(path, ["t,x,y,yaw,v,w", *lines[1:]])
     with pytest.raises(Error, match=r"odom\.csv:1: column 'theta' is missing; there are: t, x, y, yaw, v, w"):
         read_recording(folder)
+
+
+def test_a_heading_by_another_name_is_no_covariate(folder):
+    path = folder / "run_1" / "pose.csv"
+    rewrite(path, ["t,x,y,Yaw", *lines_of(path)[1:]])
+    with pytest.raises(
+        Error, match=r"pose\.csv:1: column 'theta' is missing: rename column 'Yaw' if it is the heading"
+    ):
+        read_recording(folder)
+
+
+def test_odometry_needs_no_rates_and_a_reference_no_headings(tmp_path):
+    """An eight of 2 m, forward and then backward along the same way; the heading is that of the derivative."""
+    s = np.linspace(0, 2 * np.pi, 401)
+    s = np.r_[s, s[-2::-1]]
+    t = 0.1 * np.arange(len(s))
+    theta = np.unwrap(np.arctan2(2 * np.cos(2 * s), 2 * np.cos(s)))
+    noise = np.random.default_rng(5).normal(0, 0.002, (2, len(s)))
+    true = 2 * np.sin(s), np.sin(2 * s)
+    run = Run(
+        "drive",
+        pose=series(t, "xy", *(true + noise)),
+        odom=series(t, ("x", "y", "theta"), *true, 0.9 * (theta - theta[0])),
+    )
+    write_csv_run(tmp_path / "drive", run)
+    recording = read_recording(tmp_path)
+    (read,) = recording.runs
+    assert read.odom.columns == ("x", "y", "theta", "v", "w")
+    np.testing.assert_allclose(read.odom.column("w")[100], 0.9 * (theta[100] - theta[99]) / 0.1, rtol=1e-6)
+    assert read.pose.columns == ("x", "y", "theta")
+    off = read.pose.column("theta") - theta
+    assert np.abs(off[20:-20]).max() < 0.1  # the odometry's turns are short by a tenth: 0.6 rad
+    assert any("has no headings" in words and "follow the odometry in between" in words for words in recording.problems)
+
+
+def test_a_reference_without_ways_tells_no_heading(tmp_path):
+    t = 0.1 * np.arange(50)
+    still = np.random.default_rng(1).normal(0, 0.001, (2, 50))
+    command = series([0.0], "vw", [0.0], [0.0])
+    write_csv_run(tmp_path / "drive", Run("drive", pose=series(t, "xy", *still), command=command))
+    with pytest.raises(Error, match=r"no two ways of 0\.05 m to tell headings from: not used"):
+        read_recording(tmp_path)
 
 
 def test_columns_may_come_in_any_order_quoted_and_with_covariates_among_them(folder):
@@ -217,3 +260,28 @@ def test_meta_is_read_strictly(folder):
 def test_a_table_with_an_unknown_name_is_told(folder):
     shutil.copy(folder / "run_1" / "pose.csv", folder / "run_1" / "poses.csv")
     assert read_recording(folder).problems[0].startswith("run_1/poses.csv: not read: its name is none of command.csv")
+
+
+def test_pieces_of_a_drive_are_taken_and_rows_left_out(tmp_path):
+    t = 5.0 + 0.1 * np.arange(101)
+    path = (("x", "y", "theta"), 0.03 * np.arange(101), np.zeros(101), np.zeros(101))
+    command = series([5.0, 7.0, 9.0, 14.0], "vw", [0.1, 0.2, 0.3, 0.0], np.zeros(4))
+    run = Run("drive", command=command, pose=series(t, *path), queries=np.array([[5.5, 6.0], [9.0, 10.0]]))
+    write_csv_run(tmp_path / "drive", run)
+    wanted = Excerpt(moment("8"), moment("+7"), (gap("pose:+4..10"), gap("11..11.05")))
+    recording = read_recording(tmp_path, excerpt=wanted)
+    (read,) = recording.runs
+    assert read.command.t.tolist() == [8.0, 9.0]
+    assert read.command.column("v").tolist() == [0.2, 0.3]
+    np.testing.assert_allclose(read.pose.t, np.r_[8.0:8.95:0.1, 10.1:10.95:0.1, 11.1:12.05:0.1])
+    assert read.queries.tolist() == [[9.0, 10.0]]
+    assert "drive: 72 of 101 rows of pose are left out, as asked" in recording.problems
+    assert not read_recording(tmp_path).problems
+    with pytest.raises(Error, match=r"drive: lasts from 5.000000 to 15.000000 s: nothing is left from 20.000000 to 15"):
+        read_recording(tmp_path, excerpt=Excerpt(moment("20")))
+
+
+@pytest.mark.parametrize("text", ["", "a..b", "1..", "1", "poses:1..2", "pose:1-2", "1..inf"])
+def test_rows_that_make_no_sense_are_refused(text):
+    with pytest.raises(Error, match=r"must be "):
+        gap(text)

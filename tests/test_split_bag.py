@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from recordings import full_run, write_bag
 
-from kurumaisu.critic.data.bag_parts import numbered, parts_of
+from kurumaisu.critic.bags.parts import numbered, parts_of
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error

@@ -15,7 +15,7 @@ import rosgraph
 import rospy
 
 from kurumaisu import children
-from kurumaisu.critic.data.bag_parts import numbered
+from kurumaisu.critic.bags.parts import numbered
 from kurumaisu.errors import Error
 from kurumaisu.ros.graph import publishers
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.csv_reader import OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.data.meta import Meta, recording_of_meta
@@ -38,9 +39,9 @@ def criticise_arrays(
     """Criticise a model by drives that are arrays; the same rows in CSV tables give the same verdict.
 
     runs: by name, tables whose first column is t [s]: command (n, 3) of t, v, w; voltage (n, 3) of t, v_f, v_s, or
-    (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta; odom (n, 6) of t, x, y, theta, v, w; scan
-    (n, 1 + beams); query (n, 2) of t0, t1; any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml
-    would say.
+    (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta, or (n, 3) without theta; odom (n, 6) of t,
+    x, y, theta, v, w, or (n, 4) without v, w; scan (n, 1 + beams); query (n, 2) of t0, t1; any other name: a covariate,
+    (n, 2). SI units, radians. meta: what meta.yaml would say.
     only, without: ids or patterns of effects; seed: of the particle filter that makes a missing reference.
     Raise Error naming run and table, or effect, for what cannot be used.
     """
@@ -52,7 +53,7 @@ def criticise_arrays(
 def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording:
     """Return arrays as a recording, cleaned as tables are. Raise Error naming what does not fit."""
     faults = Faults()
-    made = [run_of(run, tables, faults) for run, tables in runs.items()]
+    made = [run_of(run, tables, faults, meta.command_hold) for run, tables in runs.items()]
     if not made:
         raise Error(f"{name}: no run is given")
     for run in made:
@@ -62,8 +63,11 @@ def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording
     return recording_of_meta(name, made, meta, faults, train=train, test=test)
 
 
-def run_of(name: str, tables: Tables, faults: Faults) -> Run:
-    """Return the tables of one drive as a run; faults gets what was found wrong. Raise Error naming a misshapen one."""
+def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None) -> Run:
+    """Return the tables of one drive as a run; faults gets what was found wrong, hold: as completed has it.
+
+    Raise Error naming a misshapen table.
+    """
     parts: dict[str, Series | None] = {}
     covariates: dict[str, Series] = {}
     queries = None
@@ -80,7 +84,7 @@ def run_of(name: str, tables: Tables, faults: Faults) -> Run:
             parts[part] = series
         elif series is not None:
             covariates[part] = series
-    return replace(run_of_parts(name, parts, covariates), queries=queries)
+    return completed(replace(run_of_parts(name, parts, covariates), queries=queries), hold, faults)
 
 
 def _rows(where: str, given: ArrayLike) -> FloatArray:

@@ -16,6 +16,7 @@ from kurumaisu.critic.app import batch, inputs, results
 from kurumaisu.critic.app.display import Display, display
 from kurumaisu.critic.app.job import ERROR, Job, Outcome, run
 from kurumaisu.critic.app.options import parse
+from kurumaisu.critic.data.excerpt import Excerpt
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error, one_line
@@ -93,7 +94,8 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
     if not found:
         raise Error(f"{options.recordings[0]}: contains no recording")
     ids = effect_ids(options.only, options.without)
-    asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, not options.no_slam)
+    excerpt = Excerpt(options.start, options.stop, tuple(options.without_rows))
+    asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, not options.no_slam, excerpt)
     if len(found) == 1:
         return [replace(asked, recording=found[0], output=options.output, name=found[0].name)]
     return [

@@ -8,8 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from kurumaisu.critic.bags.containers import SUFFIXES, is_bag
 from kurumaisu.critic.data.csv_reader import is_csv_run
-from kurumaisu.critic.data.rawlog_reader import is_rawlog
+from kurumaisu.critic.data.reading import is_log
 from kurumaisu.errors import Error
 
 META = "meta.yaml"
@@ -38,26 +39,28 @@ def names(found: Sequence[Path]) -> list[str]:
 
 
 def _bare(path: Path) -> Path:
-    while path.suffix in (".bag", ".rawlog", ".gz"):
+    while path.suffix in (*SUFFIXES, ".rawlog", ".gz", ".clf", ".log"):
         path = path.with_suffix("")
     return path
 
 
 def _inside(path: Path, output: Path) -> list[Path]:
     """Return the recordings of a folder that is no recording itself, else the path."""
-    if not path.is_dir() or (path / META).is_file():
+    if not path.is_dir() or is_bag(path) or (path / META).is_file():
         return [path]
     items = [item for item in sorted(path.iterdir()) if not item.name.startswith(".")]
     folders = [item for item in items if item.is_dir() and item.resolve() != output.resolve()]
     if not any(_is_recording(folder) for folder in folders):
         return [path]
-    return sorted([*folders, *(item for item in items if item.suffix == ".bag" or is_rawlog(item))])
+    return sorted([*folders, *(item for item in items if item.is_file() and (is_bag(item) or is_log(item)))])
 
 
 def _is_recording(folder: Path) -> bool:
     """Tell whether a folder is a recording of its own, rather than a run of the recording above it."""
     if (folder / META).is_file():
         return True
+    if is_bag(folder):
+        return False
     inside = sorted(folder.iterdir())
-    runs = any(item.suffix == ".bag" or is_rawlog(item) or (item.is_dir() and is_csv_run(item)) for item in inside)
+    runs = any(is_bag(item) or is_log(item) or (item.is_dir() and is_csv_run(item)) for item in inside)
     return runs and not is_csv_run(folder)

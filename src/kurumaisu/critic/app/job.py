@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kurumaisu.critic import pipeline
+from kurumaisu.critic.data.excerpt import WHOLE, Excerpt
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.values.criticism import Criticism
@@ -28,7 +29,7 @@ class Job:
 
     name: for the table; model: None takes the recording's, else the package's; runs: only these, empty takes all;
     ids: effects that may be named, None takes all; seed: of the particle filter that makes a missing reference;
-    slam: whether SLAM is run with both models.
+    slam: whether SLAM is run with both models; excerpt: what of each run is used.
     """
 
     recording: Path
@@ -39,6 +40,7 @@ class Job:
     ids: frozenset[str] | None = None
     seed: int = 1
     slam: bool = False
+    excerpt: Excerpt = WHOLE
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def run(job: Job, progress: Callable[[str], None]) -> Outcome:
 def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:
     """Read, criticise and write into the job's folder. Raise Error naming what is wrong with the input."""
     progress(f"reading {job.recording}")
-    recording = with_reference(read_recording(job.recording, job.runs), job.seed, progress)
+    recording = with_reference(read_recording(job.recording, job.runs, job.excerpt), job.seed, progress)
     model = job.model or recording.model or shipped("launch/md100.yaml")
     criticism = pipeline.criticise(
         recording, model, progress, assume_law=job.model is not None, ids=job.ids, slam=job.slam

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kurumaisu import program
+from kurumaisu.critic.data import excerpt
 from kurumaisu.critic.values.version import version
+from kurumaisu.errors import Error
 
 _DESCRIPTION = """\
 Say what a model gets wrong about a measured robot: replay the recording through
@@ -20,6 +22,9 @@ examples:
   critic drives/ --runs 'monday_*'       some drives of a recording
   critic drives/ --only 'base.lag_*,base.delay'
                                          look for these effects only
+  critic drive.bag --from +10 --without-rows pose:+62..+63
+                                         without the beginning, and a second
+                                         in which the reference was off
   critic drives/ --json --quiet | jq .causes
                                          for programs
   critic day_1/ day_2/ --output out      several: out/day_1/report.html, ...
@@ -28,8 +33,8 @@ examples:
   critic recordings/ --dask tcp://head:8786
                                          on a Dask cluster that is there
 
-other commands, each with its own --help: critic experiment, critic plan,
-critic rehearse, critic watch. A recording of such a name is ./watch
+other commands, each with its own --help: critic look, critic experiment,
+critic plan, critic rehearse, critic watch. A recording of such a name is ./watch
 
 exit codes:
   0    none: no effect is both detectable and large enough to matter
@@ -54,11 +59,25 @@ def _parser() -> argparse.ArgumentParser:
         prog="critic", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
     )
     add = parser.add_argument
-    what = "a bag, a folder of runs or CSV tables, an MRPT rawlog, or a folder of such recordings"
+    what = "a bag, a folder of runs or CSV tables, a log of MRPT or CARMEN, or a folder of such recordings"
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="output folder (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
+    since = "12.5 as in tables and messages, or +12.5 since each drive began"
+    add("--from", dest="start", type=_moment, metavar="T", help=f"use drives from this time on [s]: {since}")
+    add("--to", dest="stop", type=_moment, metavar="T", help="use drives until this time [s]")
+    rows = (
+        "leave out rows of a part (pose, odom, scan, command, voltage), or of all that was measured, between two times"
+    )
+    add(
+        "--without-rows",
+        type=_gap,
+        action="append",
+        default=[],
+        metavar="[PART:]T..T",
+        help=f"{rows}; may be given again",
+    )
     add_effects(parser)
     add("--seed", type=int, default=1, help="seed of the particle filter for a missing reference (1)")
     add("--no-slam", action="store_true", help="do not compare SLAM with both models (saves some seconds)")
@@ -87,6 +106,20 @@ def name_list(text: str) -> tuple[str, ...]:
     if not all(parts):
         raise argparse.ArgumentTypeError(f"a name is empty: {text!r}")
     return parts
+
+
+def _moment(text: str) -> excerpt.Moment:
+    try:
+        return excerpt.moment(text)
+    except Error as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _gap(text: str) -> excerpt.Gap:
+    try:
+        return excerpt.gap(text)
+    except Error as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
 
 
 def whole_number(text: str) -> int:

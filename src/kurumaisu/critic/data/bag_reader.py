@@ -1,20 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Read a run from the topics of a ROS 1 bag."""
+"""Read a run from the topics of a bag."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.data import messages
-from kurumaisu.critic.data.bag_topics import Topic, read_topics
+from kurumaisu.critic.bags import messages
+from kurumaisu.critic.bags.containers import bag_name
+from kurumaisu.critic.bags.decoding import shown
+from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
+from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
+from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
+from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.odometry import COLUMNS
+from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
 from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
-from kurumaisu.types import FloatArray
+from kurumaisu.geometry import wrap
+from kurumaisu.names import hint
+from kurumaisu.types import FloatArray, IntArray
 
 # Topic of each part, where meta.yaml names no other.
 TOPICS = {
@@ -33,44 +45,147 @@ PutAside = Callable[[FloatArray, FloatArray | None], int]
 CLOCK_TOLERANCE = 1.0
 
 
-def read_bag_run(path: Path, topics: dict[str, str], faults: Faults, put_aside: PutAside | None = None) -> Run:
-    """Read the topics of a bag. topics: from meta.yaml, by default name or by name of a covariate.
+def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None) -> Run:
+    """Read the topics of a bag that meta names, by default name or by name of a covariate, its frames and its wheels.
 
     put_aside: takes the ranges and the intensities of each scan and returns their number, which the run's scan then has
     for its only column; None: it has the ranges.
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
-    wanted = resolve(topics)
+    wanted = _own(meta)
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
-
-    def kept(row: tuple[Fan, FloatArray, FloatArray | None]) -> tuple[Fan, FloatArray]:
-        fan, ranges, intensities = row
-        return fan, ranges if put_aside is None else np.array([put_aside(ranges, intensities)], dtype=np.float64)
-
-    found = read_topics(path, {topic: part for part, topic in wanted.items()}, {"scan": kept})
-    if "command" not in found:
-        found |= read_topics(path, {SCRIPTED: "command"})
-    for part in sorted(set(_parts(topics)) - set(found)):
-        faults.add(f"{path.name}: there is no topic {wanted[part]}")
+    found = _found(path, wanted, put_aside)
+    _name_absent(path, sorted(set(_parts(meta.topics)) & set(wanted) - set(found)), wanted, faults)
     _check_clocks(path.name, found, faults)
-    found = {part: _last_of_each_time(f"{path.name} {topic.name}", topic, faults) for part, topic in found.items()}
     series: dict[str, Series | None] = {}
     fan, covariates = None, {}
     for part, topic in found.items():
         where = f"{path.name} {topic.name}"
+        keep = _last_of_each_time(where, topic, faults)
         if part == "scan":
-            series["scan"], fan = _scan(where, topic, faults, aside=put_aside is not None)
+            series["scan"], fan = _scan(where, topic, keep, faults, aside=put_aside is not None)
         elif part in PARTS:
-            columns, rows = messages.COLUMNS[part], np.asarray(topic.rows, dtype=np.float64)
-            if part == "voltage" and not np.nan_to_num(rows[:, 2:]).any():
-                columns, rows = columns[:2], rows[:, :2]
-            series[part] = clean(Table(where, topic.times(), rows, columns, "message", 1), faults)
+            columns, rows = _said(part, topic, keep)
+            series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
-            covariates.update(_covariates(part, where, topic, faults))
-    return replace(run_of_parts(path.stem, series, covariates), fan=fan)
+            covariates.update(_covariates(part, where, topic, keep, faults))
+    series.update(_worked_out(path, meta, faults))
+    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+
+
+def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faults: Faults) -> None:
+    """Note topics of meta.yaml that are not there, with those that could serve in their place."""
+    found = survey(path) if absent else []
+    for part in absent:
+        fitting = [topic for topic in found if part in topic.serves and topic.name not in wanted.values()]
+        words = f"there are: {listed(fitting)}" if fitting else hint(wanted[part], [topic.name for topic in found])
+        faults.add(f"{path.name}: there is no topic {wanted[part]}; {words}")
+
+
+def _worked_out(path: Path, meta: Meta, faults: Faults) -> dict[str, Series | None]:
+    """Return the parts that no topic has as they are: the reference out of tf, and odometry out of wheels."""
+    series = {}
+    if meta.frames is not None:
+        where = f"{path.name} tf {meta.frames[1]} in {meta.frames[0]}"
+        t, rows = read_frame(path, *meta.frames)
+        series["pose"] = clean(Table(where, t, rows, COLUMNS[:3], "transform", 1), faults)
+    if meta.wheels is not None:
+        t, rows = read_wheels(path, meta.wheels)
+        series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
+    return series
+
+
+def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], FloatArray]:
+    """Return the columns that the messages of a part have, and their rows, (n, columns)."""
+    rows = topic.rows()[keep]
+    if topic.type == messages.FIX:
+        rows = _east_and_north(rows)
+    # Fields at 0 throughout were not filled in.
+    needed = {"voltage": 2, "odom": 3}.get(part, rows.shape[1])
+    if not np.nan_to_num(rows[:, needed:]).any():
+        rows = rows[:, :needed]
+    return messages.COLUMNS[part][: rows.shape[1]], rows
+
+
+def _east_and_north(fixes: FloatArray) -> FloatArray:
+    """Return metres east and north of the first fix, (n, 2), of latitudes and longitudes (n, 2) [rad].
+
+    Along the ellipsoid WGS 84 at that latitude: a kilometre from there, a heading is off by less than 2e-4 rad.
+    """
+    known = fixes[np.isfinite(fixes).all(axis=1)]
+    if not len(known):
+        return fixes
+    latitude, longitude = known[0]
+    a, square = 6378137.0, 6.69437999014e-3
+    bend = 1 - square * np.sin(latitude) ** 2
+    east = a / np.sqrt(bend) * np.cos(latitude) * wrap(fixes[:, 1] - longitude)
+    north = a * (1 - square) / bend**1.5 * (fixes[:, 0] - latitude)
+    return np.stack([east, north], axis=1)
+
+
+def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> dict[str, Topic]:
+    """Return the topics that are in the bag, by part."""
+
+    def converter(part: str, kind: str) -> Convert:
+        convert = messages.converter(part, kind)
+        if convert is None:
+            accepted = ", ".join(shown(name) for name in messages.accepted(part))
+            raise Error(messages.refusal(kind) or f"is of type {shown(kind)}, not of {accepted}")
+        if part == "scan" and put_aside is not None:
+            return lambda message: _aside(convert(message), put_aside)
+        return convert
+
+    parts = {topic: part for part, topic in wanted.items()}
+    found = read_topics(path, {topic: partial(converter, part) for topic, part in parts.items()})
+    if wanted["command"] not in found:
+        scripted = read_topics(path, {SCRIPTED: partial(converter, "command")})
+        if SCRIPTED in scripted:
+            found[wanted["command"]] = scripted[SCRIPTED]
+    return {part: found[topic] for part, topic in wanted.items() if topic in found}
+
+
+def _aside(row: ScanRow, put_aside: PutAside) -> ScanRow:
+    return row._replace(ranges=np.array([put_aside(row.ranges, row.intensities)], dtype=np.float64), intensities=None)
+
+
+def inventory(path: Path, meta: Meta) -> str:
+    """Return in words what could be mapped in meta.yaml, and the topics that a bag has."""
+    found = survey(path)
+    return "; ".join(
+        [*(f"meta.yaml could say {words}" for words in mappings(found, meta)), f"{path.name} has {listed(found)}"]
+    )
+
+
+def mappings(found: Sequence[Found], meta: Meta) -> list[str]:
+    """Return what meta.yaml could say so that more of a bag's topics are used, ready to paste."""
+    own = _own(meta)
+    proposed = {TOPICS[part]: topic for part, topic in proposal(found, own).items()}
+    words = [f"topics: {_yaml({**meta.topics, **proposed})}"] if proposed else []
+    names = {topic.name for topic in found}
+    if TRANSFORMS[0] in names and "pose" in own and own["pose"] not in names:
+        words.append("reference: {tf: [map, base_link]}")
+    joints = [topic.name for topic in found if topic.type == shown(JOINTS)]
+    if joints and "odom" in own and own["odom"] not in names:
+        words.append(f"wheels: {{topic: {joints[0]}, left: JOINT, right: JOINT, radius: METRES, track: METRES}}")
+    return words
+
+
+def _own(meta: Meta) -> dict[str, str]:
+    """Return the absolute topic of each part and covariate that is read from one."""
+    own = resolve(meta.topics)
+    if meta.frames is not None:
+        del own["pose"]
+    if meta.wheels is not None:
+        del own["odom"]
+    return own
+
+
+def _yaml(mapping: dict[str, str]) -> str:
+    """Return topics by name as YAML has it, in one line."""
+    return f"{{{', '.join(f'{key}: {topic}' for key, topic in mapping.items())}}}"
 
 
 def resolve(topics: dict[str, str]) -> dict[str, str]:
@@ -94,42 +209,40 @@ def _check_clocks(name: str, found: dict[str, Topic], faults: Faults) -> None:
         faults.add(f"{name}: stamps come from different clocks; receipt minus stamp: {told}", fatal=True)
 
 
-def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> Topic:
-    """Return a topic without stamps with one message for each time of receipt: the last, which holds from then on.
+def _last_of_each_time(where: str, topic: Topic, faults: Faults) -> IntArray:
+    """Return which messages count, (n,); of a topic without stamps, the last for each time of receipt.
 
     The clock of receipt has ticks, those of a simulation or of a replay coarse ones: what comes within one is no copy.
     """
+    received = np.sort(np.asarray(topic.received))
     if any(topic.stamps):
-        return topic
-    received = np.array(topic.received)
+        return np.arange(len(received))
     keep = np.flatnonzero(np.r_[received[1:] != received[:-1], True])
     dropped = len(received) - len(keep)
-    if not dropped:
-        return topic
-    are = "message was" if dropped == 1 else "messages were"
-    faults.add(f"{where}: {dropped} {are} dropped: a later one has the same time of receipt")
-    rows, stamps = [topic.rows[i] for i in keep], [topic.stamps[i] for i in keep]
-    return replace(topic, received=received[keep].tolist(), stamps=stamps, rows=rows)
+    if dropped:
+        are = "message was" if dropped == 1 else "messages were"
+        faults.add(f"{where}: {dropped} {are} dropped: a later one has the same time of receipt")
+    return keep
 
 
-def _scan(where: str, topic: Topic, faults: Faults, *, aside: bool) -> tuple[Series | None, Fan | None]:
-    fan = topic.rows[0][0]
-    keep = [i for i, (other, _) in enumerate(topic.rows) if other == fan]
-    if len(keep) < len(topic.rows):
-        faults.add(f"{where}: {len(topic.rows) - len(keep)} scans dropped: their angles differ from those of the first")
-    ranges = np.stack([topic.rows[i][1] for i in keep])
+def _scan(where: str, topic: Topic, keep: IntArray, faults: Faults, *, aside: bool) -> tuple[Series | None, Fan | None]:
+    scans = [topic.scans[i] for i in topic.order()[keep]]
+    fan = scans[0].fan
+    alike = [i for i, scan in enumerate(scans) if scan.fan == fan]
+    if len(alike) < len(scans):
+        faults.add(f"{where}: {len(scans) - len(alike)} scans dropped: their angles differ from those of the first")
+    ranges = np.stack([scans[i].ranges for i in alike])
     columns = ("row",) if aside else tuple(f"r{i}" for i in range(fan.beams))
-    return clean(Table(where, topic.times()[keep], ranges, columns, "scan", 1), faults, ranges=not aside), fan
+    times = topic.times()[keep][alike]
+    return clean(Table(where, times, ranges, columns, "scan", 1), faults, ranges=not aside), fan
 
 
-def _covariates(name: str, where: str, topic: Topic, faults: Faults) -> dict[str, Series]:
-    fields = topic.rows[0].keys()
-    t = topic.times()
-    covariates = {}
-    if not fields:
+def _covariates(name: str, where: str, topic: Topic, keep: IntArray, faults: Faults) -> dict[str, Series]:
+    if not topic.columns:
         raise Error(f"{where}: {topic.type} has no numeric field, so it cannot be a covariate")
-    for key in fields:
-        values = np.array([row[key] for row in topic.rows], dtype=np.float64)
+    t, rows = topic.times()[keep], topic.rows()[keep]
+    covariates = {}
+    for key, values in zip(topic.columns, rows.T, strict=True):
         # A driver that does not measure a field leaves it at 0 or nan.
         if key and not np.nan_to_num(values).any():
             continue

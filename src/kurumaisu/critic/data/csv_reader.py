@@ -15,6 +15,7 @@ import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
 from kurumaisu.types import FloatArray
@@ -26,14 +27,16 @@ if TYPE_CHECKING:
 REQUIRED: dict[str, tuple[str, ...]] = {
     "command": ("v", "w"),
     "voltage": ("v_f", "v_s"),
-    "pose": ("x", "y", "theta"),
-    "odom": ("x", "y", "theta", "v", "w"),
+    "pose": ("x", "y"),
+    "odom": ("x", "y", "theta"),
     "scan": (),
     "covariate": (),
 }
 # Columns that belong to a table when it has them; any other one is a covariate.
-OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w")}
+OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w"), "pose": ("theta",), "odom": ("v", "w")}
 QUERY = "query"
+_TRAJECTORIES = ("pose", "odom")  # which may also be trajectories
+_HEADINGS = frozenset({"yaw", "heading", "th", "phi", "psi", "angle", "orientation", "rotation", "bearing"})
 _MOST_COLUMNS = 20_000  # of a table; a laser has some thousand beams
 _LONGEST_NAME = 200  # characters of a column's name
 _MOST_LISTED = 20  # names of columns in a message
@@ -41,7 +44,8 @@ _MOST_LISTED = 20  # names of columns in a message
 
 def is_csv_run(folder: Path) -> bool:
     """Tell whether a folder holds a table of a run."""
-    return any((folder / f"{name}.csv").is_file() for name in (*REQUIRED, QUERY))
+    tables = any((folder / f"{name}.csv").is_file() for name in (*REQUIRED, QUERY))
+    return tables or any((folder / f"{name}{SUFFIX}").is_file() for name in _TRAJECTORIES)
 
 
 def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
@@ -60,6 +64,13 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
         if path.exists():
             parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
             _merge(covariates, more, path)
+    for part in _TRAJECTORIES:
+        path = folder / f"{part}{SUFFIX}"
+        if path.exists():
+            if part in parts:
+                raise Error(f"{path}: there is a {part}.csv, too: one or the other")
+            t, rows = read_tum(path)
+            parts[part] = clean(Table(f"{name}/{path.name}", t, rows, ("x", "y", "theta"), "row", 1), faults)
     query = folder / f"{QUERY}.csv"
     return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.exists() else None)
 
@@ -83,7 +94,9 @@ def check_queries(where: str, queries: FloatArray, first: int = 0) -> FloatArray
 
 def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | None, dict[str, Series]]:
     """Return the part itself and the covariates among its columns."""
-    columns, rows, dropped = _read(path, ("t", *REQUIRED[part]))
+    columns, rows, dropped = _read(path, ("t", *REQUIRED[part]), OPTIONAL.get(part, ()))
+    if part == "pose":
+        _check_heading(path, columns)
     for column in dropped:
         faults.add(f"{where}: column {column!r} is not read: it has no numbers")
     optional = tuple(name for name in OPTIONAL.get(part, ()) if name in columns)
@@ -107,6 +120,13 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
     return series, covariates
 
 
+def _check_heading(path: Path, columns: list[str]) -> None:
+    """Raise Error where positions have a heading by another name, which would pass for a covariate."""
+    other = next((name for name in columns if name.lower() in _HEADINGS), None)
+    if "theta" not in columns and other is not None:
+        raise Error(f"{path}:1: column 'theta' is missing: rename column {other!r} if it is the heading [rad]")
+
+
 def _covariate(where: str, name: str, t: FloatArray, values: FloatArray, faults: Faults) -> Series | None:
     """Return one column without its empty cells, or None when nothing is left."""
     given = ~np.isnan(values)
@@ -125,8 +145,13 @@ def _is_beam(name: str) -> bool:
     return name.startswith("r") and name[1:].isdecimal()
 
 
-def _read(path: Path, required: tuple[str, ...]) -> tuple[list[str], FloatArray, list[str]]:
-    """Return column names, rows (n, columns), and the names of columns without any number, left out."""
+def _read(
+    path: Path, required: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> tuple[list[str], FloatArray, list[str]]:
+    """Return column names, rows (n, columns), and the names of columns without any number, left out.
+
+    optional: columns that have a number in each row, where they are there.
+    """
     stream = io.StringIO(read_text(path, MOST_TABLE, "utf-8-sig"), newline="")
     try:
         columns = [name.strip() for name in next(csv.reader(stream), [])]
@@ -142,7 +167,7 @@ def _read(path: Path, required: tuple[str, ...]) -> tuple[list[str], FloatArray,
         if rows.shape[1] == len(columns):
             return columns, rows, []
         stream.seek(0)
-        return _read_cells(path, csv.reader(stream), columns, required)
+        return _read_cells(path, csv.reader(stream), columns, (*required, *optional))
     except csv.Error as error:
         raise Error(f"{path}: is not a table: {error}") from error
 
@@ -186,11 +211,11 @@ class _Column:
 
 
 def _read_cells(
-    path: Path, reader: Reader, names: list[str], required: tuple[str, ...]
+    path: Path, reader: Reader, names: list[str], full: tuple[str, ...]
 ) -> tuple[list[str], FloatArray, list[str]]:
-    """Read cell by cell: slow, but finds the fault, and takes quotes and the empty cells of covariates."""
+    """Read cell by cell: slow, but finds the fault, takes quotes, and empty cells where columns may have them."""
     next(reader)
-    columns = [_Column(name, name not in required and not _is_beam(name)) for name in names]
+    columns = [_Column(name, name not in full and not _is_beam(name)) for name in names]
     for row in reader:
         if row and len(row) != len(columns):
             raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(columns)} columns")

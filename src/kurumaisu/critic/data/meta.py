@@ -9,6 +9,7 @@ from pathlib import Path
 
 from kurumaisu import settings
 from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.odometry import Wheels
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error, told
 from kurumaisu.params import MOST_BEAMS, shipped
@@ -16,7 +17,11 @@ from kurumaisu.params import MOST_BEAMS, shipped
 
 @dataclass(frozen=True)
 class Meta:
-    """What meta.yaml says. train, test: names of runs, empty where left out; topics: topic of each part."""
+    """What meta.yaml says. train, test: names of runs, empty where left out; topics: topic of each part.
+
+    frames: of tf, the reference is where the second is in the first; command_hold [s]: for how long a command holds,
+    None: until the next.
+    """
 
     model: Path | None = None
     world: Path | None = None
@@ -25,6 +30,9 @@ class Meta:
     train: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
     topics: dict[str, str] = field(default_factory=dict)
+    frames: tuple[str, str] | None = None
+    wheels: Wheels | None = None
+    command_hold: float | None = None
 
 
 def recording_of_meta(
@@ -59,6 +67,9 @@ def read_meta(path: Path) -> Meta:
         train=_names(top, "train") if "train" in top else (),
         test=_names(top, "test") if "test" in top else (),
         topics=_topics(top.section("topics")) if "topics" in top else {},
+        frames=_frames(top.section("reference")) if "reference" in top else None,
+        wheels=_wheels(top.section("wheels")) if "wheels" in top else None,
+        command_hold=top.number("command_hold", above=0) if "command_hold" in top else None,
     )
     top.end()
     both = sorted(set(meta.train) & set(meta.test))
@@ -112,3 +123,25 @@ def _names(top: settings.Section, key: str) -> tuple[str, ...]:
 
 def _topics(section: settings.Section) -> dict[str, str]:
     return {name: section.text(name) for name in section.names()}
+
+
+def _frames(section: settings.Section) -> tuple[str, str]:
+    frames = section.take("tf")
+    if not isinstance(frames, list) or len(frames) != 2 or not all(isinstance(name, str) and name for name in frames):
+        raise section.error("tf", f"must be two frames, as in [map, base_link]: {told(frames)}")
+    section.end()
+    return frames[0].lstrip("/"), frames[1].lstrip("/")
+
+
+def _wheels(section: settings.Section) -> Wheels:
+    topic = section.text("topic") if "topic" in section else ""
+    sides = []
+    for side in ("left", "right"):
+        given = section.take(side)
+        names = given if isinstance(given, list) else [given]
+        if not names or not all(isinstance(name, str) and name for name in names):
+            raise section.error(side, f"must be the name of a joint, or a list of them: {told(given)}")
+        sides.append(tuple(names))
+    wheels = Wheels(sides[0], sides[1], section.number("radius", above=0), section.number("track", above=0), topic)
+    section.end()
+    return wheels

@@ -8,14 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu import geometry
 from kurumaisu.bounded_files import MOST_RAWLOG, check_file
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.odometry import COLUMNS, rates_between
 from kurumaisu.critic.values.recording import LaserMount, Run
 from kurumaisu.errors import Error, one_line
 from kurumaisu.types import FloatArray
-
-ODOM = ("x", "y", "theta", "v", "w")
 
 
 def is_rawlog(path: Path) -> bool:
@@ -47,25 +45,10 @@ def to_run(name: str, t: FloatArray, odom: FloatArray, ranges: FloatArray, fault
 
     The rates of a row are those of the interval that ends there; the first row's are those of the second.
     """
-    rows = np.column_stack([odom, _rates(t, odom)])
+    rows = np.column_stack([odom, rates_between(t, odom)])
     beams = tuple(f"r{i}" for i in range(ranges.shape[1]))
     return Run(
         name=name,
-        odom=clean(Table(f"{name} odometry", t, rows, ODOM, "entry", 1), faults),
+        odom=clean(Table(f"{name} odometry", t, rows, COLUMNS, "entry", 1), faults),
         scan=clean(Table(f"{name} scans", t, ranges, beams, "entry", 1), faults, ranges=True),
     )
-
-
-def _rates(t: FloatArray, odom: FloatArray) -> FloatArray:
-    """Return v [m/s] and w [rad/s] over each interval, (n, 2)."""
-    if len(t) < 2:
-        return np.zeros((len(t), 2))
-    step = geometry.between(odom[:-1], odom[1:])
-    turn = geometry.wrap(step[:, 2])
-    # Equation (3) in closed form: an arc is longer than its chord, which points half the turn aside.
-    chord = step[:, 0] * np.cos(turn / 2) + step[:, 1] * np.sin(turn / 2)
-    arc = chord / np.sinc(turn / (2 * np.pi))
-    dt = np.diff(t)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rates = np.column_stack([arc, turn]) / dt[:, None]
-    return np.vstack([rates[:1], rates])

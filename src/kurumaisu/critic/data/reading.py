@@ -7,11 +7,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.data.bag_parts import is_split
-from kurumaisu.critic.data.bag_reader import PutAside, read_bag_run, resolve
+from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
+from kurumaisu.critic.bags.parts import is_split
+from kurumaisu.critic.data.bag_reader import PutAside, inventory, read_bag_run, resolve
+from kurumaisu.critic.data.carmen_reader import is_carmen, read_carmen_run
 from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, read_queries
+from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
 from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_rawlog_run
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
@@ -19,48 +23,73 @@ from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 
+META = "meta.yaml"
 
-def read_recording(path: Path, wanted: Sequence[str] = ()) -> Recording:
-    """Read a folder of runs, one folder of CSV tables, one bag or one rawlog.
+
+def read_recording(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Recording:
+    """Read a folder of runs, one folder of CSV tables, one bag or one log.
 
     NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
     wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
+    excerpt: what of each run is used.
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
-    if not path.exists() and not is_split(path):
-        raise Error(f"{path}: there is no such file or folder")
-    meta_file = path / "meta.yaml"
-    meta = read_meta(meta_file) if meta_file.exists() else Meta()
+    meta = meta_of(path)
     faults = Faults()
     laser = meta.laser
     runs = []
-    for source in chosen(sources(path), wanted):
+    kept = chosen(sources(path), wanted)
+    for source in kept:
         run, mount = read_run(source, meta, faults)
+        run = cut(run, excerpt, faults)
         laser = laser or mount
         check_run(run, laser, faults)
         runs.append(run)
-    require_use(path, runs, meta, faults)
-    train, test = split(meta_file, meta, [run.name for run in runs], partly=bool(wanted))
+    require_use(path, runs, meta, faults, bags=[source for source in kept if is_bag(source) or is_split(source)])
+    train, test = split(path / META, meta, [run.name for run in runs], partly=bool(wanted))
     name = path.resolve().name if path.is_dir() else path.resolve().stem
     return recording_of_meta(name, runs, replace(meta, laser=laser), faults, train=train, test=test)
 
 
+def is_log(path: Path) -> bool:
+    """Tell whether a file is a rawlog or a log of CARMEN."""
+    return is_rawlog(path) or is_carmen(path)
+
+
+def meta_of(path: Path) -> Meta:
+    """Return what meta.yaml says of a recording: the one inside a folder, else the one beside a bag or a rawlog.
+
+    One beside it speaks of all that lies there: which runs are fitted does not concern a single one.
+    Raise Error naming file and key, and where there is no such recording.
+    """
+    if not path.exists() and not is_split(path):
+        raise Error(f"{path}: there is no such file or folder")
+    inside, beside = path / META, path.resolve().parent / META
+    if path.is_dir() and inside.exists():
+        return read_meta(inside)
+    alone = is_split(path) or is_bag(path) or is_log(path)
+    return replace(read_meta(beside), train=(), test=()) if alone and beside.exists() else Meta()
+
+
 def sources(path: Path) -> list[Path]:
-    """Return what each run is read from: a bag, a rawlog, or a folder of tables."""
+    """Return what each run is read from: a bag, a log, or a folder of tables."""
+    if is_bag(path):
+        return [path]
     if not path.is_dir():
-        if path.suffix != ".bag" and not is_rawlog(path):
-            raise Error(f"{path}: is not a recording: give a folder, a .bag or a .rawlog")
+        if not is_log(path):
+            kinds = f"a bag ({', '.join(SUFFIXES)}), a .rawlog or a log of CARMEN (.clf, .log)"
+            raise Error(f"{path}: is not a recording: give a folder, {kinds}")
         return [path]
     inside = sorted(path.iterdir())
-    bags = [item for item in inside if item.suffix == ".bag" or is_rawlog(item)]
-    folders = [item for item in inside if item.is_dir() and is_csv_run(item)]
+    bags = [item for item in inside if is_bag(item) or is_log(item)]
+    folders = [item for item in inside if item.is_dir() and item not in bags and is_csv_run(item)]
     if is_csv_run(path):
         if bags or folders:
             raise Error(f"{path}: holds both tables and runs ({(bags + folders)[0].name}): one or the other")
         return [path]
     # The queries of a bag's run lie in a folder of its name, alone.
-    names = [bag.stem for bag in bags]
+    names = [_run_name(bag) for bag in bags]
     for folder in [folder for folder in folders if folder.name in names]:
         others = [item.name for item in folder.glob("*.csv") if item.stem != QUERY]
         if others:
@@ -70,7 +99,7 @@ def sources(path: Path) -> list[Path]:
     if twice:
         raise Error(f"{path}: the run {twice[0]} exists twice")
     if not bags and not folders:
-        raise Error(f"{path}: holds no run: neither a .bag, nor a .rawlog, nor a folder with tables like pose.csv")
+        raise Error(f"{path}: holds no run: neither a bag, nor a log, nor a folder with tables like pose.csv")
     return sorted(bags + folders, key=lambda item: item.stem)
 
 
@@ -78,12 +107,19 @@ def read_run(
     source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
 ) -> tuple[Run, LaserMount | None]:
     """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
-    if source.is_dir():
+    run, mount = _read(source, meta, faults, put_aside)
+    return completed(run, meta.command_hold, faults), mount
+
+
+def _read(source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None) -> tuple[Run, LaserMount | None]:
+    if source.is_dir() and not is_bag(source):
         return read_csv_run(source, source.resolve().name, faults), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
-    run = read_bag_run(source, meta.topics, faults, put_aside)
-    queries = source.with_suffix("") / f"{QUERY}.csv"
+    if is_carmen(source):
+        return read_carmen_run(source, faults)
+    run = read_bag_run(source, meta, faults, put_aside)
+    queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 
 
@@ -98,9 +134,7 @@ def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:
 
 def _run_name(source: Path) -> str:
     """Return the name that a run of this source has."""
-    if source.is_dir():
-        return source.resolve().name
-    return rawlog_name(source) if is_rawlog(source) else source.stem
+    return rawlog_name(source) if is_rawlog(source) else bag_name(source)
 
 
 def split(
@@ -118,8 +152,11 @@ def split(
     return train, tuple(name for name in meta.test if name in names)
 
 
-def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults) -> None:
-    """Raise Error unless a run says something about base or laser; note the runs that do not."""
+def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Faults, bags: Sequence[Path] = ()) -> None:
+    """Raise Error unless a run says something about base or laser, with what is in the first of the bags.
+
+    Note the runs that do not.
+    """
     useless = [run for run in runs if not usable(run)]
     told = {f"{run.name}: is of no use: it has {_has(run)}" for run in useless}
     for words in sorted(told):
@@ -132,6 +169,7 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
             f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
             f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
             + "".join(f"; {note}" for note in faults.notes if note not in told)
+            + "".join(f"; {inventory(bag, meta)}" for bag in bags[:1])
         )
 
 

@@ -12,8 +12,8 @@ import numpy as np
 from kurumaisu.critic.data.bag_reader import resolve
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run
-from kurumaisu.critic.data.meta import Meta, read_meta
-from kurumaisu.critic.data.reading import chosen, read_run, sources
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.view.spool import Spool
 from kurumaisu.errors import Error
@@ -34,9 +34,7 @@ def read_album(path: Path, wanted: Sequence[str]) -> Album:
 
     Raise Error for what cannot be read, and where there is nothing to look at.
     """
-    if not path.exists():
-        raise Error(f"{path}: there is no such file or folder")
-    meta = read_meta(path / "meta.yaml") if (path / "meta.yaml").is_file() else Meta()
+    meta = meta_of(path)
     faults, spools, runs, laser = Faults(), {}, [], meta.laser
     for source in chosen(sources(path), wanted):
         spool = Spool()

@@ -14,6 +14,7 @@ from kurumaisu.errors import Error, failed
 # Other commands, by the first word, and where their main is.
 _PARTS = {
     "experiment": "kurumaisu.ros.experiment.command",
+    "look": "kurumaisu.critic.app.look",
     "plan": "kurumaisu.critic.experiment.plan",
     "rehearse": "kurumaisu.critic.experiment.rehearse",
     "watch": "kurumaisu.ros.tools.critic_watch",

@@ -23,7 +23,7 @@ from kurumaisu.critic.app.options import add_effects, whole_number
 from kurumaisu.critic.app.results import causes
 from kurumaisu.critic.app.watch import ContinuousCritic, WatchedCriticism
 from kurumaisu.critic.app.window import Heard, Window
-from kurumaisu.critic.data import messages
+from kurumaisu.critic.bags import messages
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta

@@ -14,7 +14,7 @@ from nav_msgs.msg import Odometry
 
 from kurumaisu import program
 from kurumaisu.bounded_files import MOST_RECORDING, check_file
-from kurumaisu.critic.data.bag_parts import parts_of
+from kurumaisu.critic.bags.parts import parts_of
 from kurumaisu.errors import Error
 from kurumaisu.msg import Voltages
 from kurumaisu.paper.chair import dead_reckoning

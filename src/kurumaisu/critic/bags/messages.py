@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +30,17 @@ MAIN_FIELD = {
 # Ranges are float32 in a bag: rounding to this many decimals gives back what the sensor reported in metres.
 RANGE_DECIMALS = 6
 
+FIX = "sensor_msgs/NavSatFix"  # whose rows are latitude and longitude [rad]
+
 Converter = Callable[[Any], Any]
+
+
+class ScanRow(NamedTuple):
+    """A scan: its fan, ranges [m], (beams,), and intensities, None where there is not one for each."""
+
+    fan: Fan
+    ranges: Any
+    intensities: Any
 
 
 def converter(part: str, kind: str) -> Converter | None:
@@ -45,12 +55,33 @@ def accepted(part: str) -> list[str]:
     return list(_CONVERTERS[part])
 
 
+def serves_as(kind: str) -> list[str]:
+    """Return the parts that a message type may serve as."""
+    return [part for part in PARTS if kind in _CONVERTERS[part]]
+
+
+def refusal(kind: str) -> str:
+    """Return why a message type that looks like a command is none, else ''."""
+    return _REFUSED.get(kind, "")
+
+
 def _twist(message: Any) -> tuple[float, ...]:
     return message.linear.x, message.angular.z
 
 
 def _pose(pose: Any) -> tuple[float, ...]:
     return pose.position.x, pose.position.y, _yaw(pose.orientation)
+
+
+def _transform(transform: Any) -> tuple[float, ...]:
+    return transform.translation.x, transform.translation.y, _yaw(transform.rotation)
+
+
+def _fix(message: Any) -> tuple[float, ...]:
+    """Return latitude and longitude [rad], nan without a fix."""
+    if message.status.status < 0:
+        return math.nan, math.nan
+    return math.radians(message.latitude), math.radians(message.longitude)
 
 
 def _yaw(q: Any) -> float:
@@ -61,8 +92,7 @@ def _yaw(q: Any) -> float:
         return math.nan
 
 
-def _scan(message: Any) -> tuple[Fan, Any, Any]:
-    """Return the fan, its ranges, and its intensities, None where there is not one for each."""
+def _scan(message: Any) -> ScanRow:
     ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
     # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
     ranges[(ranges < round(message.range_min, RANGE_DECIMALS)) | (ranges <= 0)] = np.nan
@@ -71,7 +101,7 @@ def _scan(message: Any) -> tuple[Fan, Any, Any]:
     numbers = (message.angle_min, message.angle_increment, message.time_increment, message.scan_time)
     angle_min, increment, time_increment, scan_time = (float(number) for number in numbers)
     intensities = message.intensities if len(message.intensities) == len(ranges) else None
-    return Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities
+    return ScanRow(Fan(angle_min, increment, len(ranges), time_increment, scan_time), ranges, intensities)
 
 
 def _numbers(message: Any, main: str) -> dict[str, float]:
@@ -102,7 +132,24 @@ _CONVERTERS: dict[str, dict[str, Converter]] = {
         "nav_msgs/msg/Odometry": lambda m: _pose(m.pose.pose),
         "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
         "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+        "geometry_msgs/msg/TransformStamped": lambda m: _transform(m.transform),
+        "geometry_msgs/msg/Pose": _pose,
+        "geometry_msgs/msg/Pose2D": lambda m: (m.x, m.y, m.theta),
+        "geometry_msgs/msg/PointStamped": lambda m: (m.point.x, m.point.y),
+        "geometry_msgs/msg/Point": lambda m: (m.x, m.y),
+        "sensor_msgs/msg/NavSatFix": _fix,
     },
-    "odom": {"nav_msgs/msg/Odometry": lambda m: (*_pose(m.pose.pose), *_twist(m.twist.twist))},
+    "odom": {
+        "nav_msgs/msg/Odometry": lambda m: (*_pose(m.pose.pose), *_twist(m.twist.twist)),
+        "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
+        "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
+    },
     "scan": {"sensor_msgs/msg/LaserScan": _scan},
+}
+_STEERED = (
+    "steers by an angle and does not turn by a rate, which the critic's models do: give a twist of what was asked"
+)
+_REFUSED = {
+    f"ackermann_msgs/msg/{name}": f"a command of type ackermann_msgs/{name} {_STEERED}"
+    for name in ("AckermannDrive", "AckermannDriveStamped")
 }

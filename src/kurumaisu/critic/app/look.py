@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""critic look RECORDING: what was recorded, what it could serve as, and what is missing, before anything is fitted."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from kurumaisu import program
+from kurumaisu.critic.app.display import cells, printable
+from kurumaisu.critic.app.options import name_list
+from kurumaisu.critic.bags.containers import is_bag
+from kurumaisu.critic.bags.parts import is_split
+from kurumaisu.critic.bags.survey import survey
+from kurumaisu.critic.bags.topics import read_topics
+from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, resolve
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.consistency import check_run
+from kurumaisu.critic.data.meta import Meta
+from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
+from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.errors import Error, failed
+from kurumaisu.types import FloatArray
+
+_DESCRIPTION = """\
+Say what a recording holds and what each part of it could serve as: types, counts,
+rates, gaps, clocks; what meta.yaml could map; and what is missing for which
+verdict. Nothing is fitted, and nothing written."""
+_FASTER = 5.0  # times the usual interval is a gap
+_ENOUGH = 60.0  # [s] of motion, below which small effects stay hidden
+_JOINTS = "sensor_msgs/JointState"
+_IMU = "sensor_msgs/Imu"
+
+
+@dataclass(frozen=True)
+class Times:
+    """Times of rows (n,) [s], in the order they came, and how much later they were received [s], None: not known."""
+
+    t: FloatArray
+    late: float | None = None
+
+    @property
+    def told(self) -> tuple[str, str, str]:
+        """Rate, gaps and clock, in words."""
+        steps = np.diff(np.unique(self.t))
+        if not len(steps):
+            return "", "", self._clock()
+        usual = float(np.median(steps))
+        gaps = steps[steps > _FASTER * usual]
+        told = f"{len(gaps)}, up to {gaps.max():.3g} s" if len(gaps) else "none"
+        return f"{1 / usual:.3g} Hz", told, self._clock()
+
+    def _clock(self) -> str:
+        return "receipt" if self.late is None else f"stamp, {1e3 * self.late:+.3g} ms"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print what there is; return 0, or 1 for what cannot be read or used."""
+    options = _parser().parse_args(arguments)
+    try:
+        for line in look(options.recording, options.runs):
+            print(printable(line), flush=True)
+    except Error as error:
+        return failed("critic look", error)
+    return 0
+
+
+def look(path: Path, wanted: Sequence[str] = ()) -> Iterator[str]:
+    """Yield lines for people about the runs of a recording. Raise Error for what cannot be read."""
+    meta = meta_of(path)
+    faults = Faults()
+    runs = []
+    for source in chosen(sources(path), wanted):
+        yield f"{source}:"
+        if is_bag(source) or is_split(source):
+            yield from _topics(source, meta)
+        run, mount = read_run(source, meta, faults)
+        check_run(run, meta.laser or mount, faults)
+        runs.append(run)
+        yield from _parts(run)
+    yield ""
+    yield from (f"data: {note}" for note in faults.notes)
+    yield from missing(runs, meta)
+
+
+def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
+    """Yield, for each verdict, whether the runs serve for it, or what is missing."""
+    inputs = [run for run in runs if run.command or run.voltage]
+    posed = [run for run in inputs if run.pose or run.odom]
+    if posed:
+        source = "measured poses" if all(run.pose for run in posed) else "odometry: what the wheels do on the floor"
+        yield f"base: {_moving(posed):.0f} s of motion, against {source}" + (
+            " does not show" if source.startswith("odom") else ""
+        )
+        if _moving(posed) < _ENOUGH:
+            yield f"  small effects may stay hidden: {_ENOUGH:.0f} s of motion, both ways and both turns, show most"
+    elif any(run.odom and run.pose for run in runs):
+        yield "base: of odometry alone, against poses, over 2 s at a time; commands or voltages would show lags, too"
+    else:
+        yield f"base: not criticised: missing {'poses or odometry' if inputs else 'commands or voltages'}"
+    scanned = [run for run in runs if run.scan]
+    lacking = [
+        words
+        for words, there in (
+            ("scans", scanned),
+            ("a map (world: in meta.yaml)", meta.world),
+            ("measured poses", any(run.pose for run in scanned or runs)),
+        )
+        if not there
+    ]
+    yield (
+        f"laser: not criticised: missing {', '.join(lacking)}" if lacking else "laser: scans, a map and poses are there"
+    )
+    if len(runs) > 1:
+        yield f"gain: on {'the test drives' if meta.test else 'each drive in turn'}"
+    else:
+        yield "gain: on each quarter of the only drive; a second drive would say more"
+
+
+def _moving(runs: Sequence[Run]) -> float:
+    """Return for how long [s] the inputs asked for motion."""
+    total = 0.0
+    for run in runs:
+        series = run.voltage or run.command
+        assert series is not None
+        still = series.values[:, :2] == (np.median(series.values[:, :2], axis=0) if run.voltage else 0.0)
+        asked = ~still.all(axis=1)
+        end = max(float(part.t[-1]) for part in (run.pose, run.odom, series) if part is not None)
+        total += float(np.diff(np.append(series.t, end))[asked].clip(0).sum())
+    return total
+
+
+def _topics(source: Path, meta: Meta) -> Iterator[str]:
+    """Yield the table of a bag's topics, and what meta.yaml could map."""
+    found = survey(source)
+    roles = {topic: part for part, topic in resolve(meta.topics).items()}
+    useful = {topic.name for topic in found if topic.serves or topic.name in roles}
+    times = {
+        name: Times(topic.times(), topic.lateness())
+        for name, topic in read_topics(source, dict.fromkeys(useful, lambda _: lambda _: ())).items()
+    }
+    rows = [("topic", "type", "messages", "rate", "gaps", "clock", "serves as")]
+    for topic in found:
+        told = times[topic.name].told if topic.name in times else (f"{topic.rate:.3g} Hz", "", "")
+        could = [f"could be {TOPICS[part]}" for part in topic.serves]
+        role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could) or _note(topic.type)
+        rows.append((topic.name, topic.type, str(topic.count), *told, role))
+    yield from _table(rows)
+    yield from (f"  meta.yaml could say  {words}" for words in mappings(found, meta))
+
+
+def _note(kind: str) -> str:
+    if kind == _JOINTS:
+        return "could be wheels"
+    return "not used" if kind == _IMU else ""
+
+
+def _parts(run: Run) -> Iterator[str]:
+    """Yield the table of what a run is made of."""
+    rows = [("part", "rows", "from", "to", "rate", "gaps")]
+    for name in (*PARTS, *run.covariates):
+        series: Series | None = run.covariates.get(name) or getattr(run, name, None)
+        if series is not None:
+            rate, gaps, _ = Times(series.t).told
+            rows.append((name, str(len(series.t)), f"{series.t[0]:.3f} s", f"{series.t[-1]:.3f} s", rate, gaps))
+    yield from _table(rows)
+
+
+def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    widths = [max(cells(printable(row[i])) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        padded = (cell + " " * (width - cells(printable(cell))) for cell, width in zip(row, widths, strict=True))
+        yield f"  {'  '.join(padded)}".rstrip()
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = program.Parser(prog="critic look", description=_DESCRIPTION, allow_abbrev=False)
+    what = "a bag, a folder of runs or CSV tables, or a log of MRPT or CARMEN"
+    parser.add_argument("recording", type=Path, metavar="RECORDING", help=what)
+    words = "only these runs; patterns like drive_* are allowed"
+    parser.add_argument("--runs", type=name_list, default=(), metavar="A,B", help=words)
+    return parser

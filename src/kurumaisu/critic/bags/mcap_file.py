@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""MCAP files with messages of ROS 1 or ROS 2."""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import StreamReader, breakup_chunk
+from rosbags.interfaces import (
+    Connection,
+    ConnectionExtRosbag1,
+    ConnectionExtRosbag2,
+    MessageDefinition,
+    MessageDefinitionFormat,
+)
+from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
+from rosbags.typesys.msg import normalize_msgtype
+
+from kurumaisu.critic.bags.limits import MOST_UNPACKED, UNPACKERS, Unpacker
+from kurumaisu.errors import Error, told
+
+_FORMATS = {
+    "ros1msg": MessageDefinitionFormat.MSG,
+    "ros2msg": MessageDefinitionFormat.MSG,
+    "ros2idl": MessageDefinitionFormat.IDL,
+    "omgidl": MessageDefinitionFormat.IDL,
+}
+_ROS1, _ROS2 = "ros1", "cdr"
+_LATEST = 2**63 - 1
+
+
+class McapFile:
+    """Reads from the beginning to the end, so that a file whose index was never written is found to be cut."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.connections: list[Connection] = []
+        self.start_time, self.end_time = _LATEST, 0  # [ns] of the first message, and just after the last
+        self._unpacker = Unpacker(path, path.stat().st_size)
+
+    @property
+    def metadata(self) -> ReaderMetadata:
+        """What a reader of ROS 2 bags knows of a file."""
+        count = sum(connection.msgcount for connection in self.connections)
+        duration = self.end_time - self.start_time if count else 0
+        return ReaderMetadata(duration, self.start_time, self.end_time, count, None, None, None, None)
+
+    def open(self) -> None:
+        """Find the channels; some may hold messages that are none of ROS."""
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Channel] = {}
+        counts: Counter[int] = Counter()
+        for record in self._records():
+            if isinstance(record, Schema):
+                schemas[record.id] = record
+            elif isinstance(record, Channel):
+                channels[record.id] = record
+            elif isinstance(record, Message):
+                counts[record.channel_id] += 1
+                self.start_time = min(self.start_time, record.log_time)
+                self.end_time = max(self.end_time, record.log_time + 1)
+        self.connections = [
+            self._connection(channel, schemas.get(channel.schema_id), counts[channel.id])
+            for channel in channels.values()
+        ]
+
+    def close(self) -> None:
+        """Forget the channels."""
+        self.connections = []
+
+    def __enter__(self) -> McapFile:
+        """Open."""
+        self.open()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close."""
+        self.close()
+
+    def messages(
+        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
+    ) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, time of logging [ns] and data, in the order of the file, from start until before stop."""
+        wanted = {connection.id: connection for connection in connections}
+        first, last = start or 0, _LATEST if stop is None else stop
+        for record in self._records():
+            if isinstance(record, Message) and record.channel_id in wanted and first <= record.log_time < last:
+                yield wanted[record.channel_id], record.log_time, record.data
+
+    def _records(self) -> Iterator[McapRecord]:
+        size = self.path.stat().st_size
+        with self.path.open("rb") as file:
+            whole: Any = _Whole(file, size)
+            for place, record in enumerate(StreamReader(whole, emit_chunks=True, record_size_limit=size).records):
+                if isinstance(record, Chunk):
+                    yield from breakup_chunk(self._unpacked(record, place))
+                else:
+                    yield record
+
+    def _unpacked(self, chunk: Chunk, place: int) -> Chunk:
+        if not chunk.compression:
+            return chunk
+        if chunk.compression not in UNPACKERS:
+            raise Error(f"{self.path}: is packed by {told(chunk.compression)}, which is not known")
+        data = self._unpacker.unpack(chunk.compression, chunk.data, place)
+        if len(data) != chunk.uncompressed_size or (
+            chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc
+        ):
+            raise Error(f"{self.path}: a chunk is damaged: its sum or its size is wrong")
+        return replace(chunk, compression="", data=data)
+
+    def _connection(self, channel: Channel, schema: Schema | None, count: int) -> Connection:
+        kind, definition = "", MessageDefinition(MessageDefinitionFormat.NONE, "")
+        if schema is not None:
+            kind = normalize_msgtype(schema.name) if channel.message_encoding in (_ROS1, _ROS2) else schema.name
+            if schema.encoding in _FORMATS:
+                definition = MessageDefinition(_FORMATS[schema.encoding], schema.data.decode())
+        qos = channel.metadata.get("offered_qos_profiles", "")
+        ext: ConnectionExtRosbag1 | ConnectionExtRosbag2 = ConnectionExtRosbag1(None, None)
+        if channel.message_encoding != _ROS1:
+            ext = ConnectionExtRosbag2(channel.message_encoding, parse_qos(qos) if qos else [])
+        return Connection(channel.id, channel.topic, kind, definition, "", count, ext, self)
+
+
+class _Whole:
+    """A file that never gives less than it was asked for."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file, self._size = file, size
+
+    def read(self, count: int) -> bytes:
+        if count > min(self._size - self._file.tell(), MOST_UNPACKED * 4):
+            raise EOFError("it ends within a record")
+        return self._file.read(count)

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Read topics of a bag: only those that are wanted, message by message."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Connection
+
+from kurumaisu.critic.bags.containers import broken, opened
+from kurumaisu.critic.bags.decoding import decoder, shown
+from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.parts import parts_of
+from kurumaisu.errors import Error
+from kurumaisu.types import FloatArray, IntArray
+
+Row = tuple[float, ...] | dict[str, float] | ScanRow
+Convert = Callable[[Any], Row | None]  # None: a message that says nothing of what is wanted
+Wanted = Mapping[str, Callable[[str], Convert]]
+
+
+@dataclass
+class Topic:
+    """Messages of one topic: times [ns], the stamp 0 where there is none, and what each says.
+
+    columns: of numbers, known where the messages name them; scans: what is no row of numbers.
+    """
+
+    name: str
+    type: str
+    received: array[int] = field(default_factory=lambda: array("q"))
+    stamps: array[int] = field(default_factory=lambda: array("q"))
+    numbers: array[float] = field(default_factory=lambda: array("d"))
+    columns: tuple[str, ...] = ()
+    scans: list[ScanRow] = field(default_factory=list)
+
+    def add(self, received: int, stamp: int, row: Row) -> None:
+        """Append a message."""
+        self.received.append(received)
+        self.stamps.append(stamp)
+        if isinstance(row, ScanRow):
+            self.scans.append(row)
+        elif isinstance(row, dict):
+            self.columns = self.columns or tuple(row)
+            self.numbers.extend(row.values())
+        else:
+            self.numbers.extend(row)
+
+    def order(self) -> IntArray:
+        """Return the indices of messages in the order of receipt, (n,): some files have another."""
+        return np.argsort(np.asarray(self.received), kind="stable")
+
+    def rows(self) -> FloatArray:
+        """Return the numbers in the order of receipt, (n, m)."""
+        return np.asarray(self.numbers, dtype=np.float64).reshape(len(self.received), -1)[self.order()]
+
+    def times(self) -> FloatArray:
+        """Return the stamp of each message, or else when it was received, in the order of receipt, (n,) [s]."""
+        stamps, received = np.asarray(self.stamps), np.asarray(self.received)
+        # Integers divide to the float nearest to the decimal number of seconds, the one CSV reads.
+        times = [int(ns) / 1_000_000_000 for ns in np.where(stamps != 0, stamps, received)[self.order()]]
+        return np.array(times, dtype=np.float64)
+
+    def lateness(self) -> float | None:
+        """Return the median of receipt minus stamp [s], None when nothing is stamped."""
+        stamps, received = np.asarray(self.stamps), np.asarray(self.received)
+        late = (received - stamps)[stamps != 0]
+        return float(np.median(late)) / 1e9 if len(late) else None
+
+
+def read_topics(path: Path, wanted: Wanted) -> dict[str, Topic]:
+    """Read the topics that are in the bag, or in all parts of one that was split, by absolute topic.
+
+    wanted: by topic, what makes of a message's type a function from a message to its row; raises Error for a type
+    that does not serve. Raise Error naming file, topic and type for what cannot be read.
+    """
+    found: dict[str, Topic] = {}
+    converters: dict[tuple[str, str], Convert] = {}
+    for bag, connection, received, message in read_messages(path, wanted):
+        name, kind = absolute(connection.topic), connection.msgtype
+        where = f"{bag}: {connection.topic}"
+        if (name, kind) not in converters:
+            try:
+                converters[name, kind] = wanted[name](kind)
+            except Error as error:
+                raise Error(f"{where}: {error}") from error
+        topic = found.setdefault(name, Topic(connection.topic, shown(kind)))
+        try:
+            row = converters[name, kind](message)
+            if row is not None:
+                topic.add(received, _stamp(message), row)
+        except AttributeError as error:
+            raise Error(f"{where}: {shown(kind)} has another definition here: {error}") from error
+        except Error as error:
+            raise Error(f"{where}: {error}") from error
+    return {name: topic for name, topic in found.items() if topic.received}
+
+
+def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[Path, Connection, int, Any]]:
+    """Yield file, connection, time of receipt [ns] and message, of all parts of a bag. topics: absolute names.
+
+    Raise Error naming file and topic for what cannot be read.
+    """
+    for bag in parts_of(path):
+        with Reading(bag), opened(bag) as opened_bag:
+            chosen = [connection for connection in opened_bag.connections if absolute(connection.topic) in topics]
+            decoders: dict[Any, Callable[[bytes], Any]] = {}
+            for connection, received, data in opened_bag.messages(chosen) if chosen else ():
+                key = connection.msgtype, connection.msgdef
+                if key not in decoders:
+                    decoders[key] = decoder(bag, connection)
+                yield bag, connection, received, _decoded(bag, connection, decoders[key], data)
+
+
+class Reading:
+    """Turns whatever a parser trips over in a damaged file into an Error that names it."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
+        """Raise Error in place of another exception."""
+        if error is None or isinstance(error, Error) or not isinstance(error, Exception):
+            return
+        if isinstance(error, OSError):
+            raise Error(f"{self._path}: {error.strerror or error}") from error
+        raise Error(f"{broken(self._path)}: {str(error) or type(error).__name__}") from error
+
+
+def absolute(topic: str) -> str:
+    """Return a topic's absolute name: rosbag records a relative one as it was typed."""
+    return f"/{topic.strip('/')}"
+
+
+def _decoded(path: Path, connection: Connection, decode: Callable[[bytes], Any], data: bytes) -> Any:
+    try:
+        return decode(data)
+    except Exception as error:  # of the decoder that was made from the bag's own definition
+        told = str(error) or type(error).__name__
+        raise Error(f"{broken(path)}: {connection.topic}: a message cannot be read: {told}") from error
+
+
+def _stamp(message: Any) -> int:
+    header = getattr(message, "header", None)
+    return 0 if header is None else int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Headings for a reference that has positions only: a robot that does not slip points the way it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
+from kurumaisu.types import FloatArray
+
+_SHORTEST = 0.05  # [m] least way whose direction is looked at, and
+_NOISES = 40.0  # times the noise of a position: a heading is known to 2 degrees then
+_LONGEST = 10.0  # [s] that a way may take
+_LARGEST_TURN = 1.0  # [rad] within a way: the chord of an arc of even curvature points as its middle does
+_TO_SD = 1.4826  # from the median of absolute values of what is Gaussian
+
+
+@dataclass(frozen=True)
+class Guide:
+    """How a robot turned and which way it drove, roughly: times (n,) [s], headings (n,) [rad] from 0, v (n,) [m/s]."""
+
+    name: str
+    t: FloatArray
+    theta: FloatArray
+    v: FloatArray
+
+
+def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float]:
+    """Return positions x, y with theta, and over how long a way each heading was measured [m].
+
+    Directions of ways correct the guide's heading, which fills in between and while the robot stands; without a guide
+    headings are interpolated, and the robot is taken to drive forward.
+    Raise Error where there are not two ways.
+    """
+    t, places = positions.t, positions.values[:, :2]
+    way = max(_SHORTEST, _NOISES * _noise(places))
+    theta = np.zeros(len(t)) if guide is None else np.interp(t, guide.t, guide.theta)
+    ahead = np.ones(len(t)) if guide is None else np.sign(guide.v[np.clip(_before(guide.t, t), 0, None)])
+    found = [
+        ((t[i] + t[j]) / 2, _course(places[j] - places[i], ahead[i]) - theta[i : j + 1].mean())
+        for i, j in _ways(t, places, theta, ahead, way)
+    ]
+    if len(found) < 2:
+        raise Error(f"has positions without headings, and no two ways of {way:.2g} m to tell headings from")
+    times, offsets = np.array(found).T
+    offsets = np.unwrap(offsets)
+    offsets -= offsets[0] - wrap(offsets[0])
+    values = np.column_stack([places, theta + np.interp(t, times, offsets)])
+    return Series(t, values, ("x", "y", "theta")), way
+
+
+def _before(times: FloatArray, at: FloatArray) -> FloatArray:
+    return np.asarray(np.searchsorted(times, at, side="right") - 1)
+
+
+def _noise(places: FloatArray) -> float:
+    """Return the sd of a position [m], from how far each is off the middle of its neighbours."""
+    if len(places) < 3:
+        return 0.0
+    off = places[1:-1] - (places[:-2] + places[2:]) / 2
+    return float(_TO_SD * np.median(np.abs(off - np.median(off, axis=0))) / np.sqrt(1.5))
+
+
+def _course(step: FloatArray, ahead: float) -> float:
+    return float(np.arctan2(step[1], step[0]) + (np.pi if ahead < 0 else 0.0))
+
+
+def _ways(t: FloatArray, places: FloatArray, theta: FloatArray, ahead: FloatArray, way: float) -> list[tuple[int, int]]:
+    """Return first and last rows of ways that follow each other, each as short as `way` [m] allows."""
+    found: list[tuple[int, int]] = []
+    i = 0
+    while i < len(t) - 1:
+        j = i + 1
+        while j < len(t) and np.hypot(*(places[j] - places[i])) < way and t[j] - t[i] < _LONGEST:
+            j += 1
+        inside = slice(i, j + 1)
+        if j < len(t) and t[j] - t[i] < _LONGEST and ahead[i] and (ahead[i:j] == ahead[i]).all():
+            if np.ptp(theta[inside]) < _LARGEST_TURN:
+                found.append((i, j))
+            i = j
+        else:
+            i += 1
+    return found
