@@ -1,165 +1,102 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is decided after the search: which sets stay open, and when all is judged anew."""
+"""What is decided: a curve only where it is likelier than the catalogue in any form, each heard with its own noise."""
 
-from collections import defaultdict
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import unknown_effects as hidden
 
-from kurumaisu.bench.hidden import Ask, make
-from kurumaisu.bench.hidden.base import recordings
-from kurumaisu.bench.hidden.generator.noise import Colour, Regime
-from kurumaisu.bench.hidden.oracle import noise_of
-from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import refit, search
-from kurumaisu.critic.engine.catalogue import Term
-from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.judge import decide
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.noise.base_noise import START, NoiseGrowth
-from kurumaisu.critic.pipeline import criticise
-from kurumaisu.critic.unknown.beyond_catalogue import Beyond
-from kurumaisu.critic.unknown.comparison import CurveComparison
-from kurumaisu.effects import Parameter
-from kurumaisu.params import load_model, shipped
+from kurumaisu.critic.search.posterior import SearchResult
+
+TRUTH = hidden.USUAL.position_sd, hidden.USUAL.heading_sd
 
 
-def fit_of(names):
-    return SimpleNamespace(ids=frozenset(names.split()), candidates=frozenset(names.split()), score=0.0)
+def fit_of(score, *names):
+    chosen = frozenset(names)
+    return SimpleNamespace(ids=chosen, candidates=chosen, score=score)
 
 
-def found_of(*sets, confounded=()):
-    return SearchResult((*map(fit_of, sets), fit_of("")), defaultdict(lambda: 1.0), confounded, 0.0)
-
-
-def undriven():
-    """Return a problem of which nothing is asked."""
-    problem = SimpleNamespace(missed=None)
-    problem.changed = lambda **_: problem
-    return problem
-
-
-def decision(found, better=None):
-    beyond = Beyond(CurveComparison((), -np.inf, {}, {}, 0.0), None, 1.0, better)
-    return Decision(undriven(), found, NoiseGrowth(0.0, 0.0, START), beyond)
-
-
-def test_what_is_named_is_in_no_set():
-    """A curve that draws b speaks for it: it is named then, and not one of two that cannot be told apart."""
-    found = found_of("a b", confounded=(("b", "c"), ("d", "e")))
-    p = {"a": 1.0, "b": 0.95, "c": 0.05, "d": 0.6, "e": 0.4}
-    again = decide.with_curve_odds(found, p)
-    assert again.confounded == (("d", "e"),)
-    assert again.named == ("a", "b")
+def curve_of(nats, form_of=None, fit=None):
+    return SimpleNamespace(fit=fit or fit_of(0.0), curve=SimpleNamespace(id="smooth.w.v"), nats=nats, form_of=form_of)
 
 
 @pytest.fixture
-def judged(monkeypatch):
-    """Return the sets about which all was judged, and what each of them led to, to be filled."""
-    asked, answers = [], {}
+def found_of(monkeypatch):
+    """Return what makes a result of fits and curves that are no more than their evidence."""
+    monkeypatch.setattr(SearchResult, "log_posterior", lambda _, one: one.nats if hasattr(one, "nats") else one.score)
 
-    def judge(_first, found, *_):
-        asked.append(" ".join(sorted(found.best.ids)))
-        return answers[asked[-1]]
+    def make(score, *curves, enough=True):
+        return SearchResult((fit_of(score, "a"), fit_of(0.0)), curves, {"a": 1.0}, {}, (), enough)
 
-    monkeypatch.setattr(search, "search", lambda *_: found_of("wrong"))
-    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: None)
-    monkeypatch.setattr(decide, "_judged", judge)
-    return asked, answers
+    return make
 
 
-def decided():
-    return decide.decide(undriven(), None, lambda _: None)
+def test_a_curve_is_told_only_where_it_beats_the_catalogue(found_of):
+    curve = curve_of(30.0)
+    assert decide.likelier_curve(found_of(20.0, curve, curve_of(25.0))) is curve
+    assert decide.likelier_curve(found_of(40.0, curve)) is None
+    assert decide.likelier_curve(found_of(20.0)) is None
 
 
-def test_noise_taken_about_a_set_that_is_not_the_best_is_taken_again(judged):
-    asked, answers = judged
-    answers |= {"wrong": decision(found_of("right")), "right": decision(found_of("right"))}
-    assert decided() is answers["right"]
-    assert asked == ["wrong", "right"]
+def test_a_curve_that_is_another_form_of_an_effect_is_no_news(found_of):
+    """Nor is the next best one, which draws the same a little worse."""
+    assert decide.likelier_curve(found_of(20.0, curve_of(30.0, form_of="a"), curve_of(29.0))) is None
 
 
-def test_a_better_set_that_a_curve_led_to_is_where_the_search_goes_on(judged):
-    _asked, answers = judged
-    answers |= {"wrong": decision(found_of("wrong"), fit_of("better")), "better": decision(found_of("better"))}
-    assert decided() is answers["better"]
+def test_few_data_show_no_curve(found_of):
+    assert decide.likelier_curve(found_of(20.0, curve_of(30.0), enough=False)) is None
 
 
-def test_two_sets_that_lead_to_each_other_come_to_an_end(judged):
-    asked, answers = judged
-    answers |= {"wrong": decision(found_of("other")), "other": decision(found_of("wrong"))}
-    assert decided().found.best.ids in ({"wrong"}, {"other"})
-    assert len(asked) == 2
+def test_the_lead_is_that_over_the_best_of_the_catalogue(found_of):
+    made = Decision(SimpleNamespace(), found_of(20.0, curve_of(30.0)), NoiseGrowth(0.0, 0.0, START), SimpleNamespace())
+    assert made.lead == 10.0
+    assert made.something
+    assert not Decision(SimpleNamespace(), SearchResult((fit_of(0.0),), (), {}, {}, ()), made.growth).something
 
 
-@pytest.mark.parametrize(
-    ("start", "better"),
-    [
-        ({"a": 0.0, "b": 0.2}, False),
-        ({"a": 0.9, "b": 0.2}, True),
-        ({"a": 0.9, "b": 3.0}, False),
-        ({"a": 0.9}, True),
-        ({"b": 0.2}, False),
-        ({"c": 1.0}, False),
-    ],
-)
-def test_a_fit_that_first_values_beat_is_stuck(start, better):
-    """The best values are 1 and 0.2; the fit stuck at 0.5 and 0.2, as on a wrong peak.
-
-    Where first values are those of a part of the set, the rest stays as it was fitted.
-    """
-    parameter = Parameter("offset", "V", null=0.0, scale=1.0, lower=-5.0, upper=5.0)
-    problem = SimpleNamespace(residual=lambda _, values: 4.0 * (values - [1.0, 0.2]))
-    terms, own = (Term("a", parameter, 0.0), Term("b", parameter, 0.0)), (0.5, 0.2)
-    at = {term.key: value for term, value in zip(terms, own, strict=True)}
-    fit = SimpleNamespace(terms=terms, start=at, log_likelihood=-2.0)
-    assert refit.start_is_better(problem, fit, {(name, "offset"): value for name, value in start.items()}) is better
-    assert not refit.start_is_better(problem, SimpleNamespace(terms=()), {("a", "offset"): 0.9})
+def decided(recording, *ids):
+    """Return what is decided of drives whose noise nobody knows."""
+    problem = hidden.problem_of(recording, frozenset(ids)).changed(noise=START)
+    return decide.decide(problem, TRUTH, lambda _: None)
 
 
-@pytest.mark.parametrize(("by_noise", "least", "curved"), [(0.0, 3.0, True), (3.5, 3.0, False), (3.5, 1.0, True)])
-def test_a_curve_has_to_beat_the_noise_that_would_take_it_up(judged, monkeypatch, by_noise, least, curved):
-    curve = SimpleNamespace()
-    won = decision(found_of("a"))
-    won = replace(won, beyond=Beyond(CurveComparison((curve,), 5.0, {}, {}, 0.0, least), curve, 0.0))
-    monkeypatch.setattr(decide.beyond_catalogue, "hinted_curve", lambda *_: curve)
-    monkeypatch.setattr(decide, "_by_noise", lambda *_: by_noise)
-    plain = decision(found_of("a"))
-    monkeypatch.setattr(decide, "_judged", lambda _first, _found, hint, *_: plain if hint is None else won)
-    assert decided() is (won if curved else plain)
+GAINS = "base.gain_v", "base.gain_w"
 
 
-def test_noise_about_nothing_hides_no_weak_turn_by_the_heading():
-    """Its slow part has taken the turn up: about nothing the curve is behind, about itself 4 nats ahead."""
-    case = make(Ask("unknown", ("heading_veer",), form="other", family="base"), 37103)
-    verdict = criticise(case.recording, shipped("launch/md100.yaml"), lambda _: None).verdict
-    assert [(one.channel, one.covariate) for one in verdict.unknown] == [("base.w", "heading")]
-    assert verdict.verdict == "unknown"
-    assert not verdict.causes
+@pytest.mark.parametrize("seed", [1, 2])
+def test_where_nothing_acts_there_is_noise_alone(seed):
+    made = decided(hidden.make(hidden.KINDS["gully"], 20.0, seed, seconds=30.0, runs=2).null, *GAINS)
+    assert not made.something
+    assert made.growth.p < 0.9
+    noise = made.problem.noise
+    assert noise.sd_v == pytest.approx(hidden.USUAL.sd_v, rel=0.5)
+    assert noise.sd_w == pytest.approx(hidden.USUAL.sd_w, rel=0.5)
 
 
-def test_slow_noise_is_heard_where_noise_about_a_curve_lacks_it():
-    regime = Regime((Colour((0.01, 0.002, 0.01), 0.2), Colour((0.01, 0.001, 0.03), 3.0)), 0.002, 0.002)
-    data = recordings.recording("null", recordings.draw_drives("rich", regime, np.random.default_rng(1), rate=5.0), ())
-    model, own = load_model(shipped("launch/md100.yaml")), noise_of(regime)
-    problem = Problem([prepare(run, model) for run in data.runs], model, own, ids=frozenset({"base.gain_v"}))
-    nothing = problem.fit_candidates((), {})
+@pytest.mark.parametrize("seed", [1, 3])
+def test_an_effect_and_a_curve_are_found_with_the_noise_about_them(seed):
+    """And no other effect, which took up a part of the curve before there was one."""
+    case = hidden.make(hidden.KINDS["corrugated floor"], 30.0, seed, seconds=30.0, runs=2, gain_w=0.15)
+    made = decided(case.recording, *GAINS)
+    assert made.extension is not None
+    assert made.extension.curve.id == "smooth.v.heading"
+    assert "base.gain_w" in made.extension.fit.ids
+    assert made.found.p["base.gain_w"] > 0.9 > made.found.p["base.gain_v"]
+    assert made.lead > 20
+    assert made.problem.noise.sd_v == pytest.approx(hidden.USUAL.sd_v, rel=0.5)
+    again = made.refit(made.problem.drives)
+    (gain,) = (setting for setting in again.settings if setting.id == "base.gain_w")
+    assert gain.parameters["gain"] == pytest.approx(0.15, abs=0.04)
 
-    def by_noise(lacking):
-        about = problem.changed(noise=replace(own, slow_w=lacking * own.slow_w))
-        made = SimpleNamespace(problem=about, found=SimpleNamespace(best=nothing))
-        return decide._by_noise(problem, made, (0.002, 0.002))
 
-    assert by_noise(0.3) > 10
-    assert by_noise(1.0) < 5  # what fits better than the truth by chance, with seven parameters
-
-
-def test_a_chair_that_never_turns_has_no_one_cause():
-    """Whatever swallows all of it may be of any size beyond some, so none is worth less than what has no size."""
-    case = make(Ask("confounded", ("base.dac_zero_s",), None, "other"), 54088)
-    found = criticise(case.recording, shipped("launch/md100.yaml"), lambda _: None).verdict
-    assert found.causes == ()
-    assert any({"base.dac_zero_s", "base.dead_zone_w", "base.steering_law"} <= set(group) for group in found.confounded)
+def test_slow_noise_takes_up_no_curve():
+    """Estimated about nothing, it would: so what may act is heard with the noise about it, too."""
+    slow = hidden.Kind(2, "heading", lambda s, a, b: np.sin(s.heading + 6 * a))
+    made = decided(hidden.make(slow, 25.0, 3, seconds=40.0, runs=2).recording, *GAINS)
+    assert made.extension is not None
+    assert made.extension.curve.id == "smooth.w.heading"
+    assert made.problem.noise.slow_w < 0.02

@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is said of an effect that is found but not certain: sets, curves that draw it, other forms of it."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
-import hidden_effect
 import numpy as np
 import pytest
-from hidden_effect import recording_of
-from scipy.special import logit
 
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.bench.hidden.base.catalogue import BASE
@@ -18,26 +14,19 @@ from kurumaisu.bench.hidden.generator.motion import drive as hidden_drive
 from kurumaisu.bench.hidden.generator.noise import USUAL, draw_rates, draw_reference
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive, prepare
-from kurumaisu.critic.engine import neighbouring_sets, refit, search
-from kurumaisu.critic.engine.catalogue import Candidate, Term
-from kurumaisu.critic.engine.confounding import SetPosterior, confounded
+from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.linear_screening import Screen
-from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
 from kurumaisu.critic.sanity import examination
-from kurumaisu.critic.unknown.beyond_catalogue import Beyond, undecided
-from kurumaisu.critic.unknown.comparison import CurveComparison
-from kurumaisu.critic.unknown.curves import CurveEvidence
-from kurumaisu.critic.unknown.designs import Designs
-from kurumaisu.critic.unknown.effect_likeness import EffectLikeness
-from kurumaisu.critic.values.policy import FORM_ERROR
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.confounding import SetPosterior, confounded
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
-from kurumaisu.params import EffectSetting, load_model, shipped
+from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 OFFSET = Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5)
@@ -146,16 +135,6 @@ def test_rest_tells_nothing_about_noise_that_grows_with_the_rates():
     np.testing.assert_allclose(one_speed, 0.5)
 
 
-def test_where_a_law_swallows_commands_nothing_shakes_and_nothing_tells_of_growth():
-    """Told to turn slowly a chair rests: as still as one told to rest, and no slow turn of little noise."""
-    asked = drive(np.zeros(6), [0.8, 0.0, 0.0, 0.0, 0.1, 0.1])
-    swallowed = replace(asked, still=np.repeat([False, False, False, False, True, True], 50))
-    rests = drive(np.zeros(6), [0.8, 0.0, 0.0, 0.0, 0.0, 0.0])
-    np.testing.assert_array_equal(swallowed.activity, rests.activity)
-    np.testing.assert_allclose(swallowed.pace, rests.pace)
-    assert asked.activity[-1] > 5 * swallowed.activity[-1]
-
-
 def noise_of_a_drive(growth, seed):
     """Return how likely growth is in 40 s of a drive whose whitened increments are drawn under noise that grows."""
     made = drive([0.2, 0.0, 0.7, 0.4, -0.3, 0.0, 0.1, 0.6] * 10, [0.3, 0.0, -0.5, 0.0, 0.4, 0.7, 0.0, -0.2] * 10)
@@ -175,64 +154,13 @@ def test_how_much_noise_grows_is_found_from_noise_that_does_not():
     assert noise_of_a_drive(0.0, 1).p < 0.1
 
 
-@pytest.fixture(scope="module")
-def understeering():
-    """Return a problem of chairs that understeer, without noise, the fit of that, and of nothing."""
-    effect = EffectSetting("base.understeer", {"k": 0.5})
-    drives = []
-    for seed in range(2):
-        run = hidden_effect.make_run(None, 0.0, seed, 40.0, hidden_effect.USUAL)
-        made = prepare(recording_of("made", [run]).runs[0], MODEL)
-        drives.append(made.seen_at(made.times, replay.path(made, MODEL, [effect])))
-    problem = Problem(drives, MODEL, NOISE, ids=frozenset({"base.understeer"}))
-    return problem, problem.fit(["base.understeer"], {}), problem.fit([], {})
-
-
-@pytest.mark.parametrize(("channel", "covariate", "drawn"), [("w_gain", "abs_v", True), ("v_gain", "time", False)])
-def test_a_curve_speaks_for_the_effect_that_it_draws(understeering, channel, covariate, drawn):
-    problem, best, nothing = understeering
-    designs = Designs(problem, nothing)
-    (curve,) = (c for c in designs.about(nothing).curves if (c.channel, c.basis.covariate) == (channel, covariate))
-    belief = CurveEvidence(0.0, 0.04 * np.eye(curve.basis.size))
-    found = EffectLikeness(problem, best, designs).drawn(nothing, curve, belief)
-    assert set(found) == ({"base.understeer"} if drawn else set())
-    if drawn:  # the larger the effect, the more its equation may be off
-        assert 3.0 < found["base.understeer"] < 0.05 * best.log_likelihood - 0.05 * nothing.log_likelihood
-
-
-@pytest.mark.parametrize(
-    ("channel", "covariate", "mends"), [("w_gain", "abs_v", True), ("w_gain", "time", False), ("v", "time", False)]
-)
-def test_a_curve_beside_an_effect_may_be_what_its_equation_lacks(understeering, channel, covariate, mends):
-    """Over what the effect follows it is no more than the same curve in the place of the effect would be."""
-    problem, best, nothing = understeering
-    designs = Designs(problem, best)
-    (curve,) = (c for c in designs.about(best).curves if (c.channel, c.basis.covariate) == (channel, covariate))
-    found = EffectLikeness(problem, best, designs).mended(best, curve)
-    assert set(found) == ({"base.understeer"} if mends else set())
-    assert EffectLikeness(problem, best, designs).mended(nothing, curve) == {}
-    if mends:
-        signal = 2 * (best.log_likelihood - nothing.log_likelihood)
-        assert found["base.understeer"] == pytest.approx(0.5 * FORM_ERROR**2 * signal, rel=0.05)
-
-
 def fit_of(names, score):
     ids = frozenset(names.split())
     return SimpleNamespace(ids=ids, candidates=ids, score=score, settings=())
 
 
-def found_of(p, *fits):
-    return SearchResult((*fits, fit_of("", 0.0)), p, (), 0.0)
-
-
-@pytest.mark.parametrize(
-    ("p_effect", "p_curve", "p_nothing", "said"),
-    [(0.55, 0.44, 0.01, True), (0.95, 0.04, 0.01, False), (0.5, 0.2, 0.3, False), (0.55, 0.1, 0.0, False)],
-)
-def test_an_effect_or_a_curve_for_sure_is_not_nothing(p_effect, p_curve, p_nothing, said):
-    found = found_of({"a": p_effect}, fit_of("a", 40.0))
-    rivalry = CurveComparison((SimpleNamespace(),), 0.0, {"smooth.w.v": p_curve}, {"a": logit(p_effect)}, p_nothing)
-    assert undecided(found, rivalry) is said
+def found_of(p, *fits, curves=()):
+    return SearchResult((*fits, fit_of("", 0.0)), curves, p, {}, ())
 
 
 def gain(value):
@@ -240,9 +168,8 @@ def gain(value):
     return Gain(density)
 
 
-def decision(p, *fits):
-    nothing = Beyond(CurveComparison((), -np.inf, {}, {}, 0.0), None, 1.0)
-    return Decision(SimpleNamespace(), found_of(p, *fits), NoiseGrowth(0.0, 0.0, NOISE), nothing)
+def decision(p, *fits, **more):
+    return Decision(SimpleNamespace(), found_of(p, *fits), NoiseGrowth(0.0, 0.0, NOISE), **more)
 
 
 def test_an_uncertain_effect_that_held_out_data_refuse_is_left_out():
@@ -280,21 +207,17 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
     assert not untested(made, None, ())
 
 
-@pytest.mark.parametrize(("told", "without", "best"), [(True, 0.2, ""), (False, 0.2, "a"), (False, -0.1, "")])
-def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, best):
-    """It took all their probability; where nobody would be told of it, they are weighed by themselves."""
+@pytest.mark.parametrize(("told", "without", "kept"), [(True, 0.2, True), (False, 0.2, False), (False, -0.1, True)])
+def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, kept):
+    """Where nobody would be told of it, what acts without it is told, if that is confirmed."""
     monkeypatch.setattr("kurumaisu.critic.judge.explain_unknown.is_reported", lambda *_: told)
-    twins = [SimpleNamespace(**vars(fit_of(name, 40.0)), log_likelihood=44.0, sizes=1, terms=()) for name in "ab"]
-    nothing = SimpleNamespace(**vars(fit_of("", 0.0)), log_likelihood=0.0, sizes=0, terms=())
-    found = SearchResult((*twins, nothing), {"a": 0.0, "b": 0.0}, (), 0.0)
-    curved = Beyond(CurveComparison((), 5.0, {}, {}, 0.0), SimpleNamespace(), 0.0)
-    made = Decision(SimpleNamespace(), found, NoiseGrowth(0.0, 0.0, NOISE), curved)
-    other, worth = confirmed_part(made, gain(-0.1), lambda one: gain(without if one.beyond.extension is None else -0.1))
-    assert (other is made) is (best == "")
-    assert worth == gain(0.2 if best else -0.1)
-    if best:
-        assert other.found.confounded == (("a", "b"),)
-        assert other.found.p["a"] == pytest.approx(0.5, abs=0.01)
+    made = decision({"a": 1.0}, fit_of("a", 40.0), extension=SimpleNamespace())
+    other, worth = confirmed_part(made, gain(-0.1), lambda one: gain(without if one.extension is None else -0.1))
+    assert (other is made) is kept
+    assert worth == gain(-0.1 if kept else 0.2)
+    assert other.found is made.found
+    alone = decision({"a": 0.0}, fit_of("", 40.0), extension=SimpleNamespace())
+    assert confirmed_part(alone, gain(-0.1), lambda _: gain(0.2)) == (alone, gain(-0.1))  # there is nothing else
 
 
 @pytest.mark.parametrize("seed", [2, 17])
@@ -302,50 +225,6 @@ def test_another_steering_law_is_neither_a_unit_nor_a_sign(seed):
     """By the other law of V_s the chair hardly turns, and more like the volts' steps than like the rates asked for."""
     case = make(Ask("single", ("base.steering_law",), form="other", family="base"), seed)
     assert examination.examine(case.recording, MODEL).invalid == []
-
-
-def test_another_form_is_tried_without_what_stood_in_for_it():
-    """From a wrong form beside needless effects to the right form alone: no step alone is better."""
-    zero, other = (Candidate("zero", (Term("zero", OFFSET, 0.0, rough=rough),), 2.0) for rough in (False, True))
-    ahead, turning, also = (
-        Candidate(name, (Term(name, OFFSET, 0.0),), 1.0) for name in ("base.gain_v", "base.gain_w", "base.lag_w")
-    )
-    problem = SimpleNamespace(candidates=(zero, other))
-    screen = SimpleNamespace(fixed=(), parts=list, related=lambda *_: True, mends=lambda *_: True)
-
-    def tried(*needless):
-        chosen = frozenset({zero, *needless})
-        start = {("zero", "offset"): 0.4}
-        fit = SimpleNamespace(candidates=chosen, ids=frozenset(one.id for one in chosen), start=start)
-        sets = list(neighbouring_sets.neighbouring_sets(problem, screen, screen, fit))
-        # From its own size, and from that of the wrong form.
-        assert {len(begin) for chosen, begin in sets if chosen == {other}} in (set(), {0, 1})
-        return {chosen for chosen, _ in sets}
-
-    assert frozenset({other}) in tried(ahead)
-    assert frozenset({other}) in tried(ahead, turning)  # one in each rate
-    assert frozenset({other}) not in tried(turning, also)
-    assert frozenset({other, also}) in tried(turning, also)
-
-
-@pytest.mark.parametrize(
-    ("rough", "start", "again"),
-    [
-        (True, {"a": 0.0358}, True),
-        (True, {"a": 0.0186}, False),
-        (True, {"b": 1.0}, False),
-        (False, {"a": 0.0358}, False),
-    ],
-)
-def test_a_step_is_fitted_once_from_each_peak_it_may_be_on(rough, start, again):
-    """No fit goes from a step of 18.4 mV to one of 35.8 mV, and before one it may look worse."""
-    terms = Term("a", OFFSET, 0.0, rough=rough), Term("b", OFFSET, 0.0)
-    fit = SimpleNamespace(candidates=frozenset("a"), terms=terms, values=[0.0184, 0.1])
-    begun = set()
-    told = [
-        refit.other_step_size(fit, {(name, "offset"): size for name, size in start.items()}, begun) for _ in range(2)
-    ]
-    assert told == [again, False]
 
 
 def test_what_clips_does_not_hide_what_else_it_may_be():
@@ -366,15 +245,6 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     # That the top speed lies just below the one that was driven would be chance.
     assert abs(best["base.saturation"].log_likelihood - best["base.gain_v"].log_likelihood) < 0.5
     assert best["base.saturation"].score < best["base.gain_v"].score - 1.0
-
-
-def test_no_dozen_of_effects_is_pieced_together():
-    """What is strong and in no catalogue would be followed a little by every effect: for minutes, and to no end."""
-    screen = Screen.__new__(Screen)
-    screen.alike = lambda *_: False
-    some = [Candidate(f"effect {i}", (), 1.0) for i in range(7)]
-    assert screen._allowed(frozenset(some[:6]))
-    assert not screen._allowed(frozenset(some))
 
 
 @pytest.mark.parametrize(("best", "told"), [("a b", ("a", "b")), ("a", ("a", "c"))])

@@ -10,9 +10,9 @@ from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values import prior
 from kurumaisu.params import load_model, shipped
 
@@ -89,13 +89,12 @@ def test_what_has_a_direction_or_two_peculiarities_has_no_proportion(name, sizes
     assert cost == pytest.approx(float(prior.occam_plane(np.array(z))) + np.log(ways), abs=0.02)
 
 
-def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_it(monkeypatch):
+def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_it():
     """A load that delays by 7 ms: beside a delay, which the search begins from, other pairs look better by lines."""
     case = make(Ask("single", ("base.payload",), form="other"), 30488)
     quiet = Noise(0.0012, 0.00106, 0.00405, 0.00337, 0.0512, 0.408)
     more = ("payload", "delay", "curvature_v", "gain_v", "dead_zone_v", "understeer", "battery_sag", "lag_v")
     ids = frozenset(f"base.{name}" for name in more)
     problem = problem_of(case.recording.runs, quiet, ids)
-    monkeypatch.setattr(search, "_REFITS", 1)
     found = search.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
     assert found.best.ids == {"base.payload"}

@@ -59,6 +59,12 @@ def test_beyond_its_knots_a_curve_is_constant():
     np.testing.assert_allclose(moved.w, [0.05, 0.03])
 
 
+def test_the_time_since_the_chair_rested_begins_with_each_start():
+    v, w = np.array([0.0, 0.2, 0.2, 0.0, 0.0, 0.0, -0.1]), np.array([0.0, 0.0, 0.1, 0.1, 0.0, 0.0, 0.0])
+    since = effects.Follower("since_rest", 0.0).values(Motion(DT, v, w))
+    np.testing.assert_allclose(since, DT * np.array([0.0, 0.5, 1.5, 2.5, 0.0, 0.0, 0.5]))
+
+
 def test_covariates_are_what_they_are_called():
     v = np.array([0.2, 0.2, -0.4, -0.4, 0.0, 0.0])
     w = np.array([0.0, 0.0, 0.0, 0.5, 0.5, 0.0])
@@ -68,6 +74,7 @@ def test_covariates_are_what_they_are_called():
 
     np.testing.assert_allclose(values("time"), DT * np.array([0.5, 1.5, 2.5, 3.5, 4.5, 5.5]))
     np.testing.assert_allclose(values("since_command"), DT * np.array([0.5, 1.5, 0.5, 0.5, 0.5, 0.5]))
+    np.testing.assert_allclose(values("since_rest"), [np.inf] * 5 + [0.0])
     np.testing.assert_allclose(values("since_reversal"), [np.inf, np.inf, 0.004, 0.012, 0.016, 0.016])
     np.testing.assert_allclose(values("heading"), 1 + DT * np.array([0, 0, 0, 0.25, 0.75, 1.0]))
     np.testing.assert_allclose(values("distance"), DT * np.array([0.1, 0.3, 0.6, 1.0, 1.2, 1.2]))

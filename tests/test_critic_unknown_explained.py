@@ -2,7 +2,6 @@
 """When what is outside the catalogue is told: drives held out confirm it, by density or by where the chair comes to."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import unknown_effects as hidden
@@ -10,6 +9,9 @@ import unknown_effects as hidden
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.heldout.materiality import simulates_nearer
 from kurumaisu.critic.judge import explain_unknown
+from kurumaisu.critic.judge.unresolved import COVARIATE
+from kurumaisu.critic.search.curve_search import CurveSearch
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import shipped
 
@@ -46,25 +48,31 @@ def test_what_is_not_known_confirms_nothing():
     assert not simulates_nearer(gain(0.01), ("dy",))
 
 
-@pytest.mark.parametrize(("winner", "nats"), [("a curve", 5.0), (None, 62.0)])
-def test_evidence_is_over_nothing_where_an_effect_may_be_it_as_well(winner, nats):
-    """What lies between a curve and an effect that explain as much is no evidence that neither acts."""
-    fit = object()
-    best = SimpleNamespace(fit=fit, evidence=SimpleNamespace(nats=40.0))
-    rivalry = SimpleNamespace(rivals=(best,), lead=5.0, winner=winner)
-    found = SimpleNamespace(nats={fit: 22.0}.__getitem__)
-    assert explain_unknown._nats(found, SimpleNamespace(rivalry=rivalry)) == nats
+def test_a_curve_that_is_another_form_of_an_effect_is_told_as_no_unknown():
+    """Nor does it take the place of the curve that extends the model."""
+    problem = hidden.problem_of(hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording)
+    empty = problem.fit_candidates((), {})
+    first, *others = CurveSearch(problem).beside(empty)
+    other = next(replace(one, form_of="base.gain_w") for one in others if one.curve.id != first.curve.id)
+    p = {first.curve.id: 0.9}
+    found = SearchResult((empty,), (first, other), {"base.gain_w": 0.1}, p, ())
+    assert [one.p for one in explain_unknown._unknowns(problem, found)] == [0.9]
 
 
-@pytest.mark.parametrize(("least", "verdict"), [(50.0, "unknown"), (1e9, "none")])
-def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, verdict):
-    """Nothing is extended by what did not hold, and no curve is certain."""
+@pytest.mark.parametrize(
+    ("least", "unresolved", "said"),
+    [(50.0, False, "Held-out data do not confirm this: it is not"), (1e9, True, "Something is wrong")],
+)
+def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, unresolved, said):
+    """Nothing is extended by what did not hold, and no curve is certain; without one it is still not green."""
     recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
     monkeypatch.setattr(explain_unknown, "confirmed", lambda worth, nats, free: False)
     monkeypatch.setattr(explain_unknown, "simulates_nearer", lambda worth, channels: False)
     monkeypatch.setattr(explain_unknown, "NO_NOISE", least)
-    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None)
-    assert (found.verdict.verdict, found.verdict.causes) == (verdict, ())
+    ids = frozenset({"base.gain_w", "base.veer", "smooth"})
+    found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None, ids=ids)
+    assert (found.verdict.verdict, found.verdict.causes) == ("unknown", ())
     assert not any(setting.id.startswith("smooth") for setting in found.settings)
     assert all(one.p <= 0.5 for one in found.verdict.unknown)
-    assert bool(found.verdict.unknown) == ("Held-out data do not confirm this: it is not" in found.story.headline)
+    assert (found.verdict.unknown[0].covariate == COVARIATE) is unresolved
+    assert said in found.story.headline

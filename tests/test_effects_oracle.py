@@ -47,9 +47,12 @@ def watched(v, w, u, heading):
     """Each covariate in each step, by somebody who watches the drive."""
     rows, x, y, t = [], 0.0, 0.0, 0.0
     since_command, since_reversal, way, asked, distance = math.inf, math.inf, 0, (0.0, 0.0), 0.0
+    since_rest = math.inf
     for speed, turn, aside in zip(v, w, u, strict=True):
         if (speed, turn) != asked:
             asked, since_command = (speed, turn), 0.0
+        rests = speed == turn == 0
+        since_rest = 0.0 if rests else since_rest
         direction = (speed > 0) - (speed < 0)
         if direction and direction != way:
             since_reversal, way = (0.0 if way else since_reversal), direction
@@ -67,6 +70,7 @@ def watched(v, w, u, heading):
                 "wheel_right": speed + turn * TRACK / 2,
                 "time": t + DT / 2,
                 "since_command": since_command + DT / 2,
+                "since_rest": 0.0 if rests else since_rest + DT / 2,
                 "since_reversal": since_reversal + abs(speed) * DT / 2,
                 "heading": middle,
                 "distance": distance + abs(speed) * DT / 2,
@@ -78,6 +82,7 @@ def watched(v, w, u, heading):
         )
         x, y, t, heading = x + east * DT, y + north * DT, t + DT, heading + turn * DT
         since_command += DT
+        since_rest += 0.0 if rests else DT
         since_reversal += abs(speed) * DT
         distance += abs(speed) * DT
     return rows

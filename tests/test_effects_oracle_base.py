@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Every effect on the base against a second implementation, oracle_base.py, for drawn parameters and drives."""
 
+import cmath
 import math
 
 import numpy as np
@@ -16,7 +17,7 @@ STEPS = 160
 MODEL = load_model(shipped("launch/md100.yaml"))
 DRAWS = range(5)  # the last two of parameters anywhere within their bounds
 TESTED = [*oracle_base.RATES, *oracle_base.VOLTS, "base.process_noise"]
-TESTED += ["base.marker_x", "base.marker_y", "base.clock_scale"]
+TESTED += ["base.marker_x", "base.marker_y", "base.marker_yaw", "base.clock_scale"]
 
 
 def make(name, values, seed=0):
@@ -125,6 +126,28 @@ def test_a_marker_goes_its_own_way(name, key, at):
     leftward = north * math.cos(heading) - east * math.sin(heading)
     np.testing.assert_allclose(seen.rates, [forward, leftward, 0.4], atol=1e-8)
     assert float(seen.times) == t
+
+
+@pytest.mark.parametrize("yaw", [0.4, -0.03, -1.0])
+def test_a_turned_marker_goes_the_same_way_askew(yaw):
+    """Its position is base_link's; its rates are what two of its poses, close together, say in its own frame."""
+    t, h = 1.3, 1e-5
+    times = np.array([t - h, t, t + h])
+    truth = effects.Reference(times, np.array([circle(each) for each in times]), np.tile([0.5, 0.0, 0.4], (3, 1)))
+    seen = make("base.marker_yaw", {"yaw": yaw}).apply(truth)
+    np.testing.assert_allclose(seen.poses, [[*circle(each)[:2], circle(each)[2] + yaw] for each in times], atol=1e-12)
+    (before, here, after) = seen.poses
+    velocity = complex(*(after - before)[:2]) / (2 * h) / cmath.exp(1j * here[2])
+    turning = (after - before)[2] / (2 * h)
+    np.testing.assert_allclose(seen.rates[1], [velocity.real, velocity.imag, turning], atol=1e-8)
+    np.testing.assert_array_equal(seen.times, times)
+
+
+def test_a_turned_marker_sees_what_slips_sideways():
+    """A chair that slides to its left goes straight ahead for a marker that looks to the left by as much."""
+    truth = effects.Reference(np.zeros(1), np.zeros((1, 3)), np.array([[0.3, 0.4, 0.1]]))
+    seen = make("base.marker_yaw", {"yaw": math.atan2(0.4, 0.3)}).apply(truth)
+    np.testing.assert_allclose(seen.rates, [[0.5, 0.0, 0.1]], atol=1e-12)
 
 
 def test_a_fast_clock_sees_slow_rates():

@@ -106,7 +106,7 @@ def test_an_effect_is_switched_and_sized(visit, shown):
     page, rig = visit.page, shown.rig
     page.locator("#tab-effects").click()
     page.locator("#effect-search").fill("base.lag_v")
-    expect(page.locator("#effect-count")).to_have_text("1 of 59 effects, 0 on")
+    expect(page.locator("#effect-count")).to_have_text("1 of 60 effects, 0 on")
     row = page.locator(".effect-row:visible")
     row.locator("summary").click()
     number = row.get_by_label("base.lag_v, tau [s], as a number")

@@ -11,7 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import follow_commands, load_model, shipped
@@ -24,7 +26,10 @@ TRACK = MODEL.chassis.track
 
 @dataclass
 class State:
-    """Of the robot now: rates asked for, pose, time, age of the command, way since reversing, in all, a temperature."""
+    """Of the robot now: rates asked for, pose, time, age of the command, way since reversing, in all, a temperature.
+
+    moved: time since it last rested.
+    """
 
     v: float = 0.0
     w: float = 0.0
@@ -33,6 +38,7 @@ class State:
     heading: float = 0.0
     time: float = 0.0
     age: float = 0.0
+    moved: float = 1e9
     way: float = 1e9
     gone: float = 0.0
     warmth: float = 20.0
@@ -40,11 +46,15 @@ class State:
 
 @dataclass(frozen=True)
 class Kind:
-    """channel (0 v, 1 lateral, 2 w), covariate as the critic calls it, and the law for drawn numbers a, b in 0..1."""
+    """channel (0 v, 1 lateral, 2 w), covariate as the critic calls it, and the law for drawn numbers a, b in 0..1.
+
+    rests: share of the commands that are rest, besides those by chance.
+    """
 
     channel: int
     covariate: str
     law: Callable[[State, float, float], float]
+    rests: float = 0.0
 
     @property
     def name(self) -> str:
@@ -62,6 +72,7 @@ KINDS = {
     "carpet edge": Kind(2, "x", lambda s, a, b: math.tanh((s.x - 2 * a + 1) / 0.4)),
     "gully": Kind(2, "y", lambda s, a, b: bump((s.y - 2 * a + 1) / (0.4 + 0.4 * b))),
     "overshoot": Kind(0, "since_command", lambda s, a, b: math.exp(-s.age / (0.3 + 0.5 * a))),
+    "stiff after a rest": Kind(0, "since_rest", lambda s, a, b: -math.exp(-s.moved / (1.0 + a)), rests=0.3),
     "wobble after reversing": Kind(2, "since_reversal", lambda s, a, b: bump((s.way - 0.8 - 0.5 * a) / 0.3)),
     "warm grease": Kind(0, "temperature", lambda s, a, b: math.tanh((s.warmth - 24 - 4 * a) / 2)),
     "tyre lets go": Kind(2, "time", lambda s, a, b: float(s.time > 20 + 20 * a)),
@@ -83,7 +94,7 @@ def make(kind: Kind, z: float, seed: int, *, seconds: float = 60.0, runs: int = 
     """Return a case whose hidden effect has the whitened norm z; gain_w: a catalogue effect that acts as well."""
     rng = np.random.default_rng([77, seed])
     a, b, sign = rng.random(), rng.random(), rng.choice([-1, 1])
-    plans = [plan(seconds, rng) for _ in range(runs)]
+    plans = [plan(seconds, rng, kind.rests) for _ in range(runs)]
     seeds = rng.integers(2**31, size=runs)
 
     def recorded(size: float, noise: Noise | None) -> Recording:
@@ -105,6 +116,12 @@ def make(kind: Kind, z: float, seed: int, *, seconds: float = 60.0, runs: int = 
     return Case(named(recorded(size, USUAL)), named(recorded(0.0, USUAL)), sign * size)
 
 
+def problem_of(recording: Recording, ids: frozenset[str] | None = None) -> Problem:
+    """Return the problem of a recording whose noise is known; ids: the effects that may act, None: all."""
+    drives = [with_covariates(prepare(run, MODEL), run) for run in recording.runs]
+    return Problem(drives, MODEL, USUAL, ids=ids)
+
+
 def norm_between(one: Recording, other: Recording) -> float:
     """Return the whitened norm of the difference between two recordings without noise."""
     squares = 0.0
@@ -115,13 +132,13 @@ def norm_between(one: Recording, other: Recording) -> float:
     return float(np.sqrt(squares))
 
 
-def plan(seconds: float, rng: np.random.Generator) -> np.ndarray:
-    """Return commands (n, 3) of t, v, w, held for 0.8 to 3 s."""
+def plan(seconds: float, rng: np.random.Generator, rests: float = 0.0) -> np.ndarray:
+    """Return commands (n, 3) of t, v, w, held for 0.8 to 3 s; rests: share of them that are rest for sure."""
     rows, t = [], 0.0
     while t < seconds:
         v = 0.0 if rng.random() < 0.15 else rng.uniform(0.15, 0.7) * (-1 if rng.random() < 0.25 else 1)
         w = 0.0 if rng.random() < 0.25 else rng.uniform(0.1, 0.7) * rng.choice([-1, 1])
-        rows.append((t, v, w))
+        rows.append((t, 0.0, 0.0) if rests and rng.random() < rests else (t, v, w))
         t += rng.uniform(0.8, 3.0)
     return np.array([*rows, (seconds, 0.0, 0.0)])
 
@@ -139,6 +156,7 @@ def drive(commands, extra, channel, gain_w, noise, rng) -> Run:
     for k in range(steps):
         s.v, s.w, s.time = asked[k][0], asked[k][1] * (1 + gain_w), k * STEP
         s.age = 0.0 if changed[k] else s.age + STEP
+        s.moved = s.moved + STEP if s.v or s.w else 0.0
         if s.v * last < 0:
             s.way = 0.0
         last = s.v or last

@@ -23,6 +23,7 @@ MODULES = {
     "arena": "kurumaisu.bench.speed.arena",
     "stageros": "kurumaisu.bench.speed.stageros",
     "critic": "kurumaisu.bench.critic.main",
+    "strangers": "kurumaisu.bench.critic.strangers",
     "critic_time": "kurumaisu.bench.critic.cost",
     "next_experiment": "kurumaisu.bench.critic.next_experiment",
     "experiments_doc": "kurumaisu.bench.experiments_doc",

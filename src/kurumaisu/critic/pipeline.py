@@ -20,7 +20,7 @@ from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
 from kurumaisu.critic.report.page import report_page
-from kurumaisu.critic.sanity import examination
+from kurumaisu.critic.sanity import examination, masks
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.progress import Progress
@@ -48,6 +48,7 @@ def criticise(
     Raise Error when a run has no reference, or nothing that drove the robot.
     """
     model = model_of(recording, model_file, assume_law=assume_law)
+    recording = masks.set_aside(recording, model)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not withheld(recording, run)))
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
     if wrong:

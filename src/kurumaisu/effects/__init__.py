@@ -46,7 +46,7 @@ from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, sm
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
 from kurumaisu.effects.map_error import MapError
-from kurumaisu.effects.marker import MarkerX, MarkerY
+from kurumaisu.effects.marker import MarkerX, MarkerY, MarkerYaw
 from kurumaisu.effects.mechanism import Mechanism, WorldEffect
 from kurumaisu.effects.payload import Payload
 from kurumaisu.effects.process_noise import ProcessNoise
@@ -104,6 +104,7 @@ BASE: tuple[type[BaseEffect], ...] = (
     Slope,
     MarkerX,
     MarkerY,
+    MarkerYaw,
     ClockScale,
 )
 

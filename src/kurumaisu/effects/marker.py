@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""base.marker_x and base.marker_y: what the reference tracks is not at base_link."""
+"""base.marker_x, base.marker_y and base.marker_yaw: what the reference tracks is not base_link."""
 
 from dataclasses import replace
 
@@ -46,3 +46,22 @@ class MarkerY(ReferenceEffect):
     def apply(self, reference: Reference) -> Reference:
         """Shift to the left."""
         return _shift(reference, 0.0, self.values["y"])
+
+
+class MarkerYaw(ReferenceEffect):
+    """The marker is turned to the left of base_link."""
+
+    id = "base.marker_yaw"
+    parameters = (Parameter("yaw", "rad", null=0.0, scale=0.02, lower=-1.0, upper=1.0),)
+    sentence = "the heading of the reference is not the chair's: what it tracks is turned"
+    formula = "pose ⊕ (0, 0, yaw): v · cos yaw + u · sin yaw, u · cos yaw − v · sin yaw"
+    source = "geometry; motion capture and scan matching define headings of their own; 0.5-5°"
+    shows_in = Rate.V
+    follows = Follows.V
+
+    def apply(self, reference: Reference) -> Reference:
+        """Turn to the left."""
+        yaw = self.values["yaw"]
+        v, u, w = np.moveaxis(reference.rates, -1, 0)
+        rates = np.stack([v * np.cos(yaw) + u * np.sin(yaw), u * np.cos(yaw) - v * np.sin(yaw), w], axis=-1)
+        return replace(reference, poses=compose(reference.poses, np.array([0.0, 0.0, yaw])), rates=rates)

@@ -32,6 +32,7 @@ MEANINGS: Mapping[str, str] = {
     "wheel_right": "speed of the right wheel, v + w · track / 2 [m/s]",
     "time": "time since the start [s]",
     "since_command": "time since the commanded rates changed [s]",
+    "since_rest": "time since the chair last rested [s]",
     "since_reversal": "distance since the driving direction changed [m]",
     "heading": "heading in the map [rad]; periodic",
     "distance": "distance travelled since the start, back or forth [m]; periodic, for wheels out of round",
@@ -58,12 +59,13 @@ class Follower:
         self._position = (0.0, 0.0)  # [m] likewise
         self._asked = (0.0, 0.0)
         self._since = np.inf  # [s] since the last change of the command
+        self._moved = np.inf  # [s] since the chair last rested
         self._direction = 0.0  # last direction driven, 0: none yet
         self._travel = np.inf  # [m] since the last reversal
         self._way = 0.0  # [m] since the start
 
     def values(self, motion: Motion) -> FloatArray:
-        """Return the covariate in each step, (n,); inf where there was no command or no reversal yet."""
+        """Return the covariate in each step, (n,); inf where there was no command, rest or reversal yet."""
         if self._name in motion.known:
             return np.broadcast_to(np.asarray(motion.known[self._name], dtype=float), motion.v.shape)
         function = COVARIATES.get(self._name)
@@ -114,6 +116,12 @@ class Follower:
         self._asked, self._since = (float(asked[0, -1]), float(asked[1, -1])), float(ages[-1] + motion.dt)
         return np.asarray(ages + motion.dt / 2)
 
+    def since_rest(self, motion: Motion) -> FloatArray:
+        """Return the time since the chair last rested, in the middle of each step, 0 while it does [s]."""
+        ages = _since(~motion.moving, np.full(len(motion.v), motion.dt), self._moved)
+        self._moved = float(ages[-1] + motion.dt)
+        return np.asarray(np.where(motion.moving, ages - motion.dt / 2, 0.0))
+
     def since_reversal(self, motion: Motion) -> FloatArray:
         """Return the distance since the driving direction changed, in the middle of each step [m]."""
         signs = np.sign(motion.v)
@@ -145,6 +153,7 @@ COVARIATES: Mapping[str, Callable[[Follower, Motion], FloatArray]] = {
     "wheel_right": lambda self, motion: self.wheel(motion, 1),
     "time": Follower.time,
     "since_command": Follower.since_command,
+    "since_rest": Follower.since_rest,
     "since_reversal": Follower.since_reversal,
     "heading": Follower.heading,
     "distance": Follower.distance,

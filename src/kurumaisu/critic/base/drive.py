@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -18,7 +18,7 @@ from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.types import FloatArray, IntArray
 
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more
@@ -38,8 +38,7 @@ class Drive:
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose;
-    still (n,): where the chair rests although it is asked to move, None: nowhere.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
     """
 
     name: str
@@ -51,7 +50,6 @@ class Drive:
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
     heading: float | None = None
-    still: BoolArray | None = None
 
     @cached_property
     def measured(self) -> FloatArray:
@@ -105,7 +103,7 @@ class Drive:
     @property
     def _moving(self) -> FloatArray:
         asked = (self.v != 0) | (self.w != 0)
-        return np.asarray(asked if self.still is None else asked & ~self.still, dtype=np.float64)
+        return np.asarray(asked, dtype=np.float64)
 
     def seen_at(self, times: FloatArray, poses: FloatArray) -> Drive:
         """Return the drive with other poses (m + 1, 3) at other times (m + 1,)."""
@@ -171,6 +169,16 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
 def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
     return _cut(drive, np.linspace(0, len(drive.times) - 1, parts + 1).astype(int))
+
+
+def without_spans(drive: Drive, spans: Sequence[tuple[float, float]]) -> list[Drive]:
+    """Return the drive without the increments that lie within spans of time [s]; each piece keeps all inputs."""
+    if not spans:
+        return [drive]
+    since, until = drive.times[:-1], drive.times[1:]
+    held = np.any([(until > a) & (since < b) for a, b in spans], axis=0)
+    edges = np.concatenate([[-1], np.flatnonzero(held), [len(drive.times) - 1]])
+    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
 
 
 def pieces(drive: Drive, gap: float) -> list[Drive]:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -59,7 +60,7 @@ class Table:
 
     def place(self, index: int) -> str:
         """Return where a row is, in words."""
-        return f"{self.row} {index + self.first}, t = {self.t[index]:.6g} s"
+        return f"{self.row} {index + self.first}, t = {moment(self.t[index])}"
 
     def select(self, index: BoolArray | IntArray) -> Series:
         """Return chosen rows as a Series."""
@@ -183,7 +184,7 @@ def _unwrapped(where: str, series: Series, faults: Faults) -> Series:
         if len(doubtful):
             faults.add(
                 f"{where}: theta turns by more than {LARGEST_TURN:g} rad between samples "
-                f"{_times(len(doubtful))} (first: t = {series.t[doubtful[0]]:.6g} s): the direction is a guess"
+                f"{_times(len(doubtful))} (first: t = {moment(series.t[doubtful[0]])}): the direction is a guess"
             )
         # The same heading reads the same whatever multiple of a turn the file started from.
         theta = theta - 2 * np.pi * np.floor((theta[0] + np.pi) / (2 * np.pi))

@@ -190,8 +190,8 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
         subsets = [subset for size in sizes for subset in combinations(amplitudes, size)]
         forms = () if effect.id in own else effect.forms
         for terms_of, ways, usual in _forms(effect, forms):
-            # Up to the threshold nothing is smooth: what an unusual form makes of large sizes, nobody has looked at.
-            simple = usual or effect.stage > effects.Stage.THRESHOLD
+            # Of a converter nothing is smooth: what an unusual form makes of large sizes, nobody has looked at.
+            simple = usual or effect.stage > effects.Stage.CONVERTER
             ways_of = [subset if simple else tuple(replace(term, rough=True) for term in subset) for subset in subsets]
             found += [
                 Candidate(effect.id, (*own_terms, *shapes, *terms_of), ways * len(subsets), usual)

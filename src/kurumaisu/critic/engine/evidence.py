@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
+from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu._core import Whitener
@@ -24,7 +25,8 @@ from kurumaisu.critic.engine.catalogue import (
     settings_of,
     showing,
 )
-from kurumaisu.critic.engine.form_error import FormError, FormErrorWhitener
+from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
+from kurumaisu.critic.engine.form_error import SHARES, form_errors
 from kurumaisu.critic.engine.start_values import StartValues
 from kurumaisu.critic.engine.step_likelihood import StepLikelihood, Walked
 from kurumaisu.critic.noise.base_noise import Noise, whitener
@@ -38,6 +40,31 @@ _ROUGH_DERIVATIVE = 1e-4  # the same of what has many likely values: right betwe
 _AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
 _LARGER = 0.5  # by this share such sizes are made larger, to see it
 _ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
+
+
+@dataclass(frozen=True)
+class Beside:
+    """What is beside a fit: its residual (rows,), a basis of what its sizes do (rows, n), and what its equations miss.
+
+    missed: with a share of 1; share: the likeliest; nats: how much likelier the data are with it than without; forms:
+    the same of each cause alone, at that share.
+    """
+
+    residual: FloatArray
+    own: FloatArray
+    missed: Covariance
+    share: float
+    nats: float
+    forms: dict[str, float]
+
+    def white(self, columns: FloatArray) -> FloatArray:
+        """Return columns (rows, k), or a residual, whitened, without what the sizes do and what equations may miss."""
+        return self.covariance.whiten(without(self.own, columns))
+
+    @cached_property
+    def covariance(self) -> Covariance:
+        """Return the noise with what the equations miss at the likeliest share."""
+        return self.missed.scaled(self.share)
 
 
 @dataclass(frozen=True)
@@ -56,6 +83,7 @@ class Fit:
     settings: tuple[EffectSetting, ...]
     log_likelihood: float
     score: float
+    beside: Beside
 
     @property
     def ids(self) -> frozenset[str]:
@@ -89,20 +117,18 @@ class Problem:
         terms: tuple[Term, ...] | None = None,
         ids: frozenset[str] | None = None,
         known: replay.Increments | None = None,
-        missed: FormError | None = None,
     ) -> None:
         """Take terms: those that such drives can show, where somebody has found them out; ids: effects that may act.
 
-        known: of the same model; missed: what the equations of causes miss, which is noise, too.
+        known: of the same model.
         """
         self.drives = drives
         self.model = model
         self.noise = noise
         self._terms = terms
         self.ids = ids
-        self.missed = missed
         self._known = known or replay.Increments(model)
-        self._whiteners: dict[int, tuple[Drive, Whitener, FormErrorWhitener | None]] = {}
+        self._whiteners: dict[int, tuple[Drive, Whitener, Covariance]] = {}
         self._walked: Walked = {}
 
     def changed(
@@ -111,12 +137,11 @@ class Problem:
         drives: Sequence[Drive] | None = None,
         model: Model | None = None,
         noise: Noise | None = None,
-        missed: FormError | None = None,
     ) -> Problem:
-        """Return the problem, with the same terms, of other drives, another model or noise, or with more missed."""
+        """Return the problem, with the same terms, of other drives, another model or noise."""
         known = None if model is not None else self._known
         new = drives or self.drives, model or self.model, noise or self.noise
-        other = Problem(*new, self.terms, self.ids, known, missed or self.missed)
+        other = Problem(*new, self.terms, self.ids, known)
         if drives is None:
             other._walked = self._walked
         return other
@@ -177,15 +202,16 @@ class Problem:
         return both[:, 0], both[:, 1:]
 
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
-        """Return columns (3 m, k) of one of the drives, whitened."""
+        """Return columns (3 m, k) of one of the drives, whitened.
+
+        The reference's heading may be off by as much as it errs at any time throughout a drive: that is noise, too.
+        """
         if id(drive) not in self._whiteners:
-            white, muted = whitener(drive, self.noise), None
-            if self.missed is not None:
-                muted = FormErrorWhitener(self.missed.marks(partial(self.simulated, drive), white.whiten))
-            self._whiteners[id(drive)] = drive, white, muted
-        _, white, muted = self._whiteners[id(drive)]
-        columns = white.whiten(columns)
-        return columns if muted is None else muted.whiten(columns)
+            white = whitener(drive, self.noise)
+            turned = self.noise.heading_sd * self.noise.louder * _turned(drive)
+            self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(turned))
+        _, white, lasting = self._whiteners[id(drive)]
+        return lasting.whiten(white.whiten(columns))
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""
@@ -202,10 +228,12 @@ class Problem:
         terms = tuple(term for candidate in ordered for term in candidate.terms)
         if not terms:
             y = self.residual((), np.empty(0))
-            likelihood = -0.5 * float(y @ y)
-            return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood)
+            likelihood, nothing = -0.5 * float(y @ y), np.empty((len(y), 0))
+            beside = Beside(y, nothing, Covariance(nothing), 0.0, 0.0, {})
+            return Fit(frozenset(), (), np.empty(0), np.empty(0), (), likelihood, likelihood, beside)
         begun = least_squares.least_squares(self, terms, self.start_values.first(terms, start))
         solution = self.start_values.likeliest(terms, begun)
+        beside = self._beside(terms, solution)
         costs = self._occam(ordered, terms, solution)
         return Fit(
             frozenset(ordered),
@@ -213,9 +241,20 @@ class Problem:
             solution.values,
             solution.sds,
             replay.completed(self.model, settings_of(terms, solution.values)),
-            -solution.cost,
-            -solution.cost - costs,
+            beside.nats - solution.cost,
+            beside.nats - solution.cost - costs,
+            beside,
         )
+
+    def _beside(self, terms: Sequence[Term], solution: least_squares.Solution) -> Beside:
+        own = orthonormal(solution.slopes)
+        blocks = {name: Covariance(some) for name, some in form_errors(self, terms, solution.values, own).items()}
+        missed = _together(len(own), list(blocks.values()))
+        left = without(own, solution.residual)
+        gains = [missed.scaled(share).gain(left) for share in SHARES]
+        best = SHARES[int(np.argmax(gains))]
+        forms = {name: one.scaled(best).gain(left) for name, one in blocks.items()}
+        return Beside(left, own, missed, best, float(logsumexp(gains)) - float(np.log(len(SHARES))), forms)
 
     @cached_property
     def start_values(self) -> StartValues:
@@ -306,6 +345,19 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
+
+
+def _turned(drive: Drive) -> FloatArray:
+    """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
+    dx, dy, _ = drive.measured.T
+    return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
+
+
+def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:
+    """Return the noise of several causes whose equations miss something."""
+    if len(blocks) == 1:
+        return blocks[0]
+    return Covariance(np.column_stack([np.empty((rows, 0)), *(one.columns for one in blocks)]))
 
 
 def covariance(gram: FloatArray) -> FloatArray:

@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
-from kurumaisu.critic.engine import coarsened_posterior
-from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import odds
 from kurumaisu.critic.values.policy import RIVAL
 from kurumaisu.critic.values.verdict import NextExperiment
@@ -81,7 +80,7 @@ def remaining(found: SearchResult) -> tuple[list[Fit], FloatArray]:
     """
     best: dict[frozenset[str], tuple[float, Fit]] = {}
     for fit in found.fits:
-        log = coarsened_posterior.of_set(found, fit)
+        log = log_posterior(fit, len(found.p))
         if fit.ids not in best or log > best[fit.ids][0]:
             best[fit.ids] = (log, fit)
     ranked = sorted(best.values(), key=lambda pair: -pair[0])[:_RIVALS]

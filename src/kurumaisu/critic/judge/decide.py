@@ -8,22 +8,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import coarsened_posterior, form_error_fit, search, uncertain_effects
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict import parameter_doubt
-from kurumaisu.critic.unknown import beyond_catalogue, comparison, joint_fit
+from kurumaisu.critic.search import search
+from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
+from kurumaisu.critic.search.posterior import SearchResult
+from kurumaisu.critic.unknown import joint_fit
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
-from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import odds
 from kurumaisu.critic.values.progress import Progress
-from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
-_ANEW = 1  # times at most that all is judged anew, because other effects act than those about which the noise was taken
+_HINT = -3.0  # [nat] from which all is judged with the noise about a curve, too
+_LEAST = 3.0  # [nat] by which that must be likelier
+_ANEW = 2  # times that all is judged anew, because other effects act than those about which the noise was taken
 Truth = tuple[float, float] | None
 
 
@@ -31,24 +32,29 @@ Truth = tuple[float, float] | None
 class Decision:
     """What acts, in a problem whose noise is that about it.
 
-    growth: whether the noise grows with the rates; beyond: what was found outside the catalogue; untested: drives held
-    out can neither confirm nor refute it.
+    growth: whether the noise grows with the rates; extension: the best set with a curve, where that is likelier than
+    any without; untested: drives held out can neither confirm nor refute it.
     """
 
     problem: Problem
-    found: search.SearchResult
+    found: SearchResult
     growth: base_noise.NoiseGrowth
-    beyond: beyond_catalogue.Beyond
+    extension: FitWithCurve | None = None
     untested: bool = False
+
+    @property
+    def lead(self) -> float:
+        """Return by how many nats the best set with a curve is likelier than the best without."""
+        return self.found.log_posterior(self.found.curves[0]) - self.found.log_posterior(self.found.best)
 
     @property
     def something(self) -> bool:
         """Return whether there is anything to extend the model by."""
-        return bool(self.found.best.ids) or self.beyond.extension is not None
+        return bool(self.found.best.ids) or self.extension is not None
 
     def refit(self, drives: Sequence[Drive]) -> drive_gain.FittedExtension:
         """Return what was found, fitted to other drives."""
-        best, extension = self.found.best, self.beyond.extension
+        best, extension = self.found.best, self.extension
         if extension is not None:
             curved = joint_fit.refitted(extension, drives, self.problem)
             return drive_gain.FittedExtension(
@@ -64,108 +70,85 @@ class Decision:
 def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     """Return what acts in drives of which only a first noise is known.
 
-    Noise that was estimated without a curve has taken it up. So if one may act, the noise is estimated about it; and
-    if it then does not win, as if there had never been one.
+    Noise that was estimated without a curve has taken it up. So where one may act, all is judged with the noise about
+    it, too, and the likelier one holds, each heard with its own noise.
     """
     found = search.search(first, progress)
-    hint = beyond_catalogue.hinted_curve(first, found)
+    made = _settled(first, found, likelier_curve(found), truth, progress)
+    hint = _hinted_curve(first, found) if made.extension is None and found.enough else None
     if hint is not None:
-        made = _judged(first, found, hint, truth, progress)
-        rivalry = made.beyond.rivalry
-        won = made.beyond.extension is not None and rivalry.winner is not None
-        if won and rivalry.lead - _by_noise(first, made, truth) > rivalry.least:
-            return made
-        first = first.changed(missed=made.problem.missed)
-    for _ in range(_ANEW + 1):
-        made, before = _judged(first, found, None, truth, progress), found.best.ids
-        first = first.changed(missed=made.problem.missed)
-        better = made.beyond.better
-        found = made.found if better is None else replace(made.found, fits=(better, *made.found.fits))
-        if found.best.ids == before:
-            break
-    settled = made.found if made.beyond.extension is not None else uncertain_effects.without_uncertain(made.found)
-    return made if settled is made.found else replace(made, found=settled)
+        other = _settled(first, found, hint, truth, progress)
+        if other.extension is not None and _log_density(other) > _log_density(made) + _LEAST:
+            return other
+    return made
 
 
-def without_curves(made: Decision) -> Decision:
-    """Return what acts if nothing outside the catalogue does."""
-    found, beyond = made.found, beyond_catalogue.Beyond(comparison.no_curves(made.found), None, 1.0)
-    p, still_open = coarsened_posterior.of_effects(found, beyond.rivalry.odds)
-    found = uncertain_effects.without_uncertain(with_curve_odds(replace(found, confounded=still_open), p))
-    return replace(made, found=found, beyond=beyond)
-
-
-def _by_noise(first: Problem, made: Decision, truth: Truth) -> float:
-    """Return by how many nats the best set without a curve explains more with the noise about itself.
-
-    What wanders slowly is a curve over the place as well: the noise about a curve lacks what the curve has taken up, so
-    it speaks for it. Nobody knows the noise beforehand, so each side is heard with its own.
-    """
-    best = made.found.best
-    own = first.changed(noise=noise_residuals(first, best, truth, project=True).estimate(first.noise).noise)
-    return max(_density(own, best) - _density(made.problem, best), 0.0)
-
-
-def _density(problem: Problem, fit: Fit) -> float:
-    """Return the log density of the drives about a fit, up to a constant."""
-    left = problem.residual(fit.terms, fit.values)
-    volume = sum(float(base_noise.whitener(drive, problem.noise).log_determinants.sum()) for drive in problem.drives)
-    return -0.5 * (float(left @ left) + volume)
-
-
-def _judged(
-    first: Problem, found: search.SearchResult, beside: FitWithCurve | None, truth: Truth, progress: Progress
+def _settled(
+    first: Problem, found: SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
 ) -> Decision:
-    progress("estimating the noise again, with the effects found")
-    left = noise_residuals(first, found.best, truth, project=True, beside=beside)
-    final = left.estimate(first.noise)
-    growth = left.growth(final, odds(len(found.p)))
-    if growth.p > 1 / 2 and found.best.ids and beside is None:
-        # What a cause of another form leaves behind is no noise, and grows with the rates, too.
-        strict = noise_residuals(first, found.best, truth, project=True, forms=True)
-        final = strict.estimate(final.noise)
-        growth = strict.growth(final, odds(len(found.p)))
-    elif growth.p > 1 / 2 and beside is not None:
-        # The noise stays that about the curve as it is: what its knots leave is no effect of the catalogue either.
-        strict = noise_residuals(first, found.best, truth, project=True, beside=beside, forms=True)
-        growth = strict.growth(strict.estimate(final.noise), odds(len(found.p)))
-    problem = first.changed(noise=growth.noise if growth.p > 1 / 2 else final.noise)
-    again = search.search(problem, progress, found.best)
-    if problem.missed is None:
-        missed, fit = form_error_fit.likeliest_form_error(problem, again)
-        if missed is not None:
-            problem = problem.changed(missed=missed)
-            again = search.search(problem, progress, fit)
-    beyond = beyond_catalogue.judge(problem, again, progress)
-    p, still_open = coarsened_posterior.of_effects(again, beyond.rivalry.odds)
-    growth = replace(growth, p=coarsened_posterior.of_finding(again, growth.p))
-    return Decision(problem, with_curve_odds(replace(again, confounded=still_open), p), growth, beyond)
+    """Return what acts in the noise about what was found, a curve among it or not; anew where others act then."""
+    problem: Problem | None = None
+    for _ in range(_ANEW):
+        extension = None if curve is None else fitted_curve(first, curve)
+        about = found.best if curve is None else curve.fit
+        progress("estimating the noise again, with the effects found")
+        left = noise_residuals(first, about, truth, project=True, beside=extension)
+        final = left.estimate(first.noise)
+        growth = left.growth(final, odds(len(found.p)))
+        noise = growth.noise if growth.p > 1 / 2 else final.noise
+        if problem is not None and base_noise.alike(noise, problem.noise):
+            break
+        if problem is None and curve is None and base_noise.alike(noise, first.noise):
+            problem = first
+            break
+        problem = first.changed(noise=noise)
+        before, had = found, curve
+        found = search.search(problem, progress, about)
+        curve = likelier_curve(found)
+        if found.best.ids == before.best.ids and (curve is None) == (had is None):
+            break
+    assert problem is not None
+    return Decision(problem, found, growth, None if curve is None else fitted_curve(problem, curve))
 
 
-def with_curve_odds(found: search.SearchResult, p: dict[str, float]) -> search.SearchResult:
-    """Return what was found with the probabilities beside curves.
+def _hinted_curve(problem: Problem, found: SearchResult) -> SetWithCurve | None:
+    """Return the best curve beside nothing or what was found, if it may well act were nothing slow in the noise."""
+    noise = problem.noise
+    easy = problem.changed(noise=replace(noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0))
+    curves = CurveSearch(easy)
+    sets = {frozenset(): found.empty, found.best.candidates: found.best}
+    fits = [easy.fit_candidates(chosen, fit.start if chosen else {}) for chosen, fit in sets.items()]
+    tried = [one for fit in fits for one in curves.beside(fit)[:1] if one.form_of is None]
+    best = max(tried, key=lambda one: one.nats, default=None)
+    return best if best is not None and best.nats > _HINT else None
 
-    What a curve draws speaks for its effect, which may decide what the effects alone left open: then it is no set.
-    """
-    still_open = (group for group in found.confounded if all(p[name] < NAMED for name in group))
-    return replace(found, p=p, confounded=tuple(still_open))
+
+def _log_density(made: Decision) -> float:
+    """Return the log posterior density of what acts, with its noise, up to a constant."""
+    volume = sum(
+        float(base_noise.whitener(drive, made.problem.noise).log_determinants.sum()) for drive in made.problem.drives
+    )
+    curve = likelier_curve(made.found)
+    return made.found.log_posterior(made.found.best if curve is None else curve) - 0.5 * volume
+
+
+def likelier_curve(found: SearchResult) -> SetWithCurve | None:
+    """Return the best set with a curve, where that is likelier than all of the catalogue, in whatever form."""
+    best = next(iter(found.curves), None)
+    if best is None or best.form_of is not None or not found.enough:
+        return None
+    return best if found.log_posterior(best) > found.log_posterior(found.best) else None
+
+
+def fitted_curve(problem: Problem, curve: SetWithCurve) -> FitWithCurve:
+    """Return a set with its curve, fitted together."""
+    return joint_fit.fit_with_curve(problem, curve.fit, curve.curve, curve.evidence.prior)
 
 
 def noise_residuals(
-    problem: Problem,
-    fit: Fit,
-    truth: Truth,
-    *,
-    project: bool,
-    beside: FitWithCurve | None = None,
-    forms: bool = False,
+    problem: Problem, fit: Fit, truth: Truth, *, project: bool, beside: FitWithCurve | None = None
 ) -> base_noise.NoiseResiduals:
-    """Return what is left about a fit, or an extension, with all that may act projected out or nothing.
-
-    forms: with what the causes of the fit would do in other forms projected out, too, and the chair at rest where they
-    have it rest: a law that swallows small commands must not pass for noise that grows with them. Likewise with what
-    the curve would do if it had more knots.
-    """
+    """Return what is left about a fit, or an extension, with all that may act projected out or nothing."""
     settings = fit.settings if beside is None else beside.settings
     residuals = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
 
@@ -173,16 +156,8 @@ def noise_residuals(
         if not project or not problem.terms:
             return np.empty((rows, 0))
         if beside is None:
-            own = problem.simulated_columns(drive, fit)
-            return np.column_stack([own, form_error_fit.columns(problem, drive, fit)]) if forms else own
-        return joint_fit.simulated_columns(problem, drive, beside, finer=forms)
+            return problem.simulated_columns(drive, fit)
+        return joint_fit.simulated_columns(problem, drive, beside)
 
     projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
-    drives = [_resting(drive, problem.model, settings) for drive in problem.drives] if forms else problem.drives
-    return base_noise.NoiseResiduals(drives, residuals, projected, truth)
-
-
-def _resting(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> Drive:
-    """Return a drive that knows where the simulated chair rests although it is asked to move."""
-    motion = replay.motion(drive, model, settings)
-    return replace(drive, still=~motion.moving)
+    return base_noise.NoiseResiduals(problem.drives, residuals, projected, truth)

@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from kurumaisu.critic.base.covariates import with_covariates
-from kurumaisu.critic.base.drive import Drive, driven, prepare
+from kurumaisu.critic.base.drive import Drive, driven, prepare, without_spans
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import drives as scripted_drives
 from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
-from kurumaisu.critic.judge import excitation, explain, explain_unknown
+from kurumaisu.critic.heldout.materiality import share_of_way
+from kurumaisu.critic.judge import excitation, explain, explain_unknown, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
@@ -38,7 +39,7 @@ def criticise_drives(
     """Return what the drives of a recording say against a model, and what extends it by that."""
     drives = _drives(recording, model)
     progress("estimating the noise")
-    if all(drives[name].source == "odom" for name in recording.train if name in drives):
+    if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
         ids = beside_odometry(ids)
     rough, first = _begun(recording, model, drives, ids)
     by = early_stamps.lead(first, progress)
@@ -46,22 +47,25 @@ def criticise_drives(
         return explain.invalid(recording, model, [early_stamps.problem(by)]), NOTHING
     if by > 0:
         recording = replace(recording, problems=(*recording.problems, early_stamps.note(by)))
-        drives = {name: early_stamps.restamped(drive, by) for name, drive in drives.items()}
+        drives = {name: [early_stamps.restamped(drive, by) for drive in some] for name, some in drives.items()}
         rough, first = _begun(recording, model, drives, ids)
     train = list(first.drives)
-    test = [drives[name] for name in recording.test if name in drives]
+    test = [drive for name in recording.test for drive in drives.get(name, [])]
     made = decide(first, recording.truth, progress)
 
     progress("measuring the gain on held-out drives")
     left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=False)
     baseline = left.estimate(made.problem.noise).noise
-    hidden = [drives[run.name] for run in recording.runs if run.name in drives and withheld(recording, run)]
+    hidden = [drive for run in recording.runs if withheld(recording, run) for drive in drives.get(run.name, [])]
     made, held = _held_out(made, model, baseline, train, test, hidden)
     progress("planning the next drive")
     scripts = scripted_drives()
     proposal = propose(made.problem, made.found, scripts)
-    judge = explain.criticism if made.beyond.extension is None else explain_unknown.criticism
+    judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
+    best = made.found.best.settings
+    shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
+    judged = unresolved.with_unresolved(judged, made, held, shares, test)
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
 
 
@@ -106,12 +110,15 @@ def withheld(recording: Recording, run: Run) -> bool:
     return run.queries is not None and run.name in recording.test
 
 
-def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
-    """Return the drives, without those of withheld runs that have too few poses left to judge by."""
+def _drives(recording: Recording, model: Model) -> dict[str, list[Drive]]:
+    """Return the drives by run, in pieces where the chair was held between.
+
+    Without those of withheld runs that have too few poses left to judge by.
+    """
     drives = {}
     for run in filter(driven, recording.runs):
         try:
-            drives[run.name] = with_covariates(prepare(run, model), run)
+            drives[run.name] = without_spans(with_covariates(prepare(run, model), run), run.contacts)
         except Error:
             if not withheld(recording, run):
                 raise
@@ -119,9 +126,11 @@ def _drives(recording: Recording, model: Model) -> dict[str, Drive]:
 
 
 def _begun(
-    recording: Recording, model: Model, drives: Mapping[str, Drive], ids: frozenset[str] | None
+    recording: Recording, model: Model, drives: Mapping[str, Sequence[Drive]], ids: frozenset[str] | None
 ) -> tuple[Problem, Problem]:
     """Return the problem of the drives to fit, with any noise and with a first estimate of theirs."""
-    rough = Problem([drives[name] for name in recording.train if name in drives], model, base_noise.START, ids=ids)
+    rough = Problem(
+        [drive for name in recording.train for drive in drives.get(name, [])], model, base_noise.START, ids=ids
+    )
     left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=True)
     return rough, rough.changed(noise=left.estimate().noise)

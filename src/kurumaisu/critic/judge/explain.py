@@ -10,9 +10,7 @@ import numpy as np
 import scipy
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import uncertain_effects
-from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import SearchResult
+from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
@@ -28,6 +26,7 @@ from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.recording import Recording
@@ -81,10 +80,7 @@ def criticism(
     problem = made.problem
     held, shares, matters = _materiality(made, gain)
     found = replace(made.found, confounded=_told_sets(made.found, matters))
-    fitted = {
-        name: uncertain_effects.widened_intervals(found, name, intervals.estimates(problem, found.best, name))
-        for name in sorted(found.best.ids)
-    }
+    fitted = {name: intervals.estimates(problem, found.best, name) for name in sorted(found.best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
     growth = _growing_noise(made, drives)
     kind = _kind(found, matters) if growth is None else "named"
@@ -122,7 +118,7 @@ def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, flo
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
     held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
     gains = made.found.enough and (held or made.untested)
-    others = {name: _without(best, name) for name in sorted(best.ids)}
+    others = {name: without(best.settings, name) for name in sorted(best.ids)}
     shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
     felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
     return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
@@ -153,8 +149,9 @@ def _growing_noise(made: Decision, drives: Sequence[Drive]) -> Cause | None:
     return Cause(name, growth.p, {}, growth.gain_nats)
 
 
-def _without(fit: Fit, name: str) -> tuple[EffectSetting, ...]:
-    return tuple(setting for setting in fit.settings if setting.id != name)
+def without(settings: Sequence[EffectSetting], name: str) -> tuple[EffectSetting, ...]:
+    """Return settings without an effect."""
+    return tuple(setting for setting in settings if setting.id != name)
 
 
 def _open(found: SearchResult) -> tuple[str, ...]:

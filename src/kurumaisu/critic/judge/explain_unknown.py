@@ -12,7 +12,6 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.materiality import (
     FELT,
@@ -30,8 +29,8 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
 from kurumaisu.critic.judge.misfit import moments
 from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences, shapes
-from kurumaisu.critic.unknown.beyond_catalogue import Beyond
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
 from kurumaisu.critic.values.binned_means import bins
 from kurumaisu.critic.values.criticism import Criticism
@@ -50,22 +49,21 @@ def criticism(
     recording: Recording, made: Decision, gain: Gain | None, drives: Sequence[Drive], proposal: Proposal
 ) -> Criticism:
     """Return the criticism of drives in which a curve explains more than the catalogue."""
-    problem, found, beyond = made.problem, made.found, made.beyond
-    extension = beyond.extension
+    problem, found, extension = made.problem, made.found, made.extension
     assert extension is not None
     # What acts beside the curve is judged with the curve in the model.
     curved = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     fit = curved.fit_candidates(extension.fit.candidates, extension.fit.start)
-    inner = replace(found, fits=(fit, *found.fits), confounded=(), false_alarm=beyond.false_alarm)
+    inner = replace(found, fits=(fit, *found.fits), confounded=())
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), gain, drives, proposal)
     share, felt = _shares(made)
-    words = _sentences(extension, beyond, share)
+    words = _sentences(extension, made.lead, share)
     if not _confirmed(made, gain) or not _matters(share, felt):
         small = f"{words} It is too small to matter, or was not confirmed on held-out data."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
         return _unconfirmed(kept, problem, made, gain) if share >= MATERIAL else kept
-    verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, beyond)))
+    verdict = replace(beside.verdict, verdict="unknown", unknown=tuple(_unknowns(problem, found)))
     settings = (*extension.settings, process_noise(problem))
     story = replace(
         beside.story,
@@ -73,7 +71,7 @@ def criticism(
         details=(words, *beside.story.details),
         overlays=overlays(recording, problem.model, extension.settings),
         misfits=(figure(problem, extension), *(beside.story.misfits if fit.ids else ())),
-        rivals=tuple(_rivals(found, beyond)),
+        rivals=tuple(_rivals(made)),
     )
     return Criticism(verdict, story, problem.model, settings)
 
@@ -83,11 +81,11 @@ def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, gain: Gain |
 
     It follows more than one thing, or none that is known: the curves only say where to look, and extend nothing.
     """
-    extension = made.beyond.extension
+    extension = made.extension
     assert extension is not None
     if gain is None or not _no_noise(made):
         return kept
-    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.beyond))
+    curves = tuple(replace(one, p=min(one.p, _UNHELD)) for one in _unknowns(problem, made.found))
     headline = f"{sentences.headline(extension)} Held-out data do not confirm this: it is not the whole explanation."
     verdict = replace(kept.verdict, verdict="unknown", unknown=curves)
     return replace(kept, verdict=verdict, story=replace(kept.story, headline=headline))
@@ -101,7 +99,7 @@ def is_reported(made: Decision, gain: Gain | None) -> bool:
 
 def _shares(made: Decision) -> tuple[float, float]:
     """Return how far the curve moves the chair, and what it is beside the noise."""
-    extension = made.beyond.extension
+    extension = made.extension
     assert extension is not None
     settings, without = extension.settings, extension.fit.settings
     return share_of_way(made.problem, settings, without), share_of_noise(made.problem, settings, without)
@@ -112,21 +110,15 @@ def _matters(share: float, felt: float) -> bool:
 
 
 def _confirmed(made: Decision, gain: Gain | None) -> bool:
-    assert made.beyond.extension is not None
-    nats = _nats(made.found, made.beyond)
-    rate = effects.CHANNELS[made.beyond.extension.curve.channel].rate
+    assert made.extension is not None
+    rate = effects.CHANNELS[made.extension.curve.channel].rate
+    nats = made.lead
     return confirmed(gain, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(gain, (_SEEN_IN[rate],)))
 
 
 def _no_noise(made: Decision) -> bool:
-    best = made.beyond.rivalry.rivals[0]
-    return made.found.nats(best.fit) + best.evidence.nats >= NO_NOISE
-
-
-def _nats(found: SearchResult, beyond: Beyond) -> float:
-    """Return the evidence [nat] for what was found: over the catalogue, or, where an effect may be it, over nothing."""
-    best = beyond.rivalry.rivals[0]
-    return beyond.rivalry.lead if beyond.rivalry.winner else found.nats(best.fit) + best.evidence.nats
+    best = made.found.curves[0]
+    return made.found.nats(best.fit) + best.nats >= NO_NOISE
 
 
 def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
@@ -184,22 +176,27 @@ def _samples(
     return x, residual, left, use
 
 
-def _sentences(extension: FitWithCurve, beyond: Beyond, share: float) -> str:
+def _sentences(extension: FitWithCurve, lead: float, share: float) -> str:
     curve = extension.curve
     where = f"{sentences.channel(curve)} {sentences.followed(curve)}"
-    better = f"explains {beyond.rivalry.lead:.1f} nats more than the best effects of the catalogue"
+    better = f"explains {lead:.1f} nats more than the best effects of the catalogue"
     return (
         f"Outside the catalogue: {where} ({sentences.shape(extension)}) {better}; "
         f"after {HORIZON:g} s the chair is off by {100 * share:.1f} % of the distance driven or angle turned."
     )
 
 
-def _unknowns(problem: Problem, beyond: Beyond) -> Iterator[Unknown]:
+def _unknowns(problem: Problem, found: SearchResult) -> Iterator[Unknown]:
     """Yield the curve, and those that could stand in for it."""
-    p = beyond.rivalry.p
+    p = found.p_curves
     seen: set[str] = set()
-    for rival in beyond.rivalry.rivals:
-        if rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
+    for rival in found.curves:
+        if (
+            rival.form_of is not None
+            or rival.curve.id in seen
+            or len(seen) == _LISTED
+            or (seen and p[rival.curve.id] < _PLAUSIBLE)
+        ):
             continue
         seen.add(rival.curve.id)
         own = fit_with_curve(problem, rival.fit, rival.curve, rival.evidence.prior)
@@ -207,17 +204,16 @@ def _unknowns(problem: Problem, beyond: Beyond) -> Iterator[Unknown]:
         yield Unknown(sentences.channel(rival.curve), name, sentences.shape(own), min(p[rival.curve.id], 1.0))
 
 
-def _rivals(found: SearchResult, beyond: Beyond) -> Iterator[Alternative]:
+def _rivals(made: Decision) -> Iterator[Alternative]:
     """Yield the best set of the catalogue, and the best other curves."""
-    best = beyond.rivalry.rivals[0]
-    yield Alternative(
-        " + ".join(sorted(found.best.ids)) or "no effect", -beyond.rivalry.lead, "the best of the catalogue"
-    )
+    found = made.found
+    best = found.curves[0]
+    yield Alternative(" + ".join(sorted(found.best.ids)) or "no effect", -made.lead, "the best of the catalogue")
     seen = {best.curve.id}
-    for rival in beyond.rivalry.rivals:
-        if rival.curve.id not in seen and len(seen) <= _LISTED:
+    for rival in found.curves:
+        if rival.form_of is None and rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"
-            behind = rival.log_posterior - best.log_posterior
+            behind = found.log_posterior(rival) - found.log_posterior(best)
             yield Alternative(name, behind, "a curve over another quantity explains less")

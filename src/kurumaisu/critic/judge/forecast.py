@@ -15,7 +15,7 @@ def forecast_of(made: Decision, settings: Settings, baseline: Noise) -> Forecast
 
     settings: of the criticism; baseline: noise about the model as it was.
     """
-    problem, best, extension = made.problem, made.found.best, made.beyond.extension
+    problem, best, extension = made.problem, made.found.best, made.extension
     given = {setting.id for setting in settings}
     if extension is not None and extension.curve.id in given:
         return Forecast(problem.model, extension.settings, problem.noise, about_curve(extension))

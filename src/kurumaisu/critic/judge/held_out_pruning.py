@@ -10,7 +10,7 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit
 from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed, expected_nats
 from kurumaisu.critic.judge import explain_unknown
-from kurumaisu.critic.judge.decide import Decision, without_curves
+from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.values.verdict import Gain
 
 _TRIED = 2  # smaller sets, the likeliest first: each is fitted to all folds
@@ -27,7 +27,7 @@ def confirmed_part(
     found = made.found
     if gain is None:
         return made, gain
-    if made.beyond.extension is not None:
+    if made.extension is not None:
         return (made, gain) if explain_unknown.is_reported(made, gain) else _without_curves(made, gain, measure)
     if confirmed(gain, found.nats(found.best)):
         return made, gain
@@ -64,12 +64,12 @@ def untested(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool
 def _unconfirmed(made: Decision, held: Gain) -> bool:
     """Tell whether effects are certain by the drives they were fitted to, and not confirmed by those held out."""
     nats = made.found.nats(made.found.best)
-    return made.beyond.extension is None and nats >= CERTAIN and not confirmed(held, nats)
+    return made.extension is None and nats >= CERTAIN and not confirmed(held, nats)
 
 
 def _without_curves(made: Decision, gain: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
     """Return what acts if no curve does, where that is confirmed: a curve that is not must not hide it."""
-    other = without_curves(made)
+    other = replace(made, extension=None)
     if not other.something:
         return made, gain
     gained = measure(other)

@@ -12,7 +12,6 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, spans
-from kurumaisu.critic.unknown.effect_likeness import signal_of
 from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate
 from kurumaisu.params import Model
@@ -65,11 +64,18 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
     out = np.zeros(columns.shape[1])
     for name in sorted(fit.ids):
         if effects.by_id(name).empirical:
-            signal = signal_of(problem, fit, name)
+            signal = _signal(problem, fit, name)
             norms = np.linalg.norm(columns, axis=0) * np.linalg.norm(signal)
             power = FORM_ERROR**2 * float(signal @ signal)
             out += power / FORM_WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
     return np.asarray(np.sqrt(out))
+
+
+def _signal(problem: Problem, fit: Fit, name: str) -> FloatArray:
+    """Return what an effect of a fit does, whitened."""
+    terms = zip(fit.terms, fit.values, strict=True)
+    null = np.array([term.null if term.id == name and not term.shape else value for term, value in terms])
+    return problem.residual(fit.terms, null) - problem.residual(fit.terms, fit.values)
 
 
 def _next_order(problem: Problem, fit: Fit, name: str) -> float:

@@ -9,16 +9,16 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import search
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.engine.search import SearchResult
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.story import Alternative
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 
 _MINUTE = 60.0  # [s]
+OTHER_FORM = 5.0  # [nat] by which what an equation misses must be likelier than that it misses nothing
 _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
@@ -97,14 +97,21 @@ def details(
         moved = (
             f"after {HORIZON:g} s the chair is off by {100 * shares[name]:.1f} % of the distance driven or angle turned"
         )
-        said.append(f"{name}: {', '.join(told)}; {moved}{_weight(name, found, shares, matters)}.")
+        said.append(f"{name}: {', '.join(told)}; {moved}{_weight(name, found, shares, matters)}{_form(name, found)}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"Noise of the yaw rate turns the heading by about {wander:.0f}° in a minute; no model can predict it.")
-    if found.p:  # else no effect was looked for
-        alarm = f"{100 * found.false_alarm:.1f} %" if found.false_alarm > 0 else f"below {100 / search.NULLS:.2f} %"
-        said.append(f"The chance that noise alone looks this much like an effect is {alarm}.")
     return tuple(said)
+
+
+def _form(name: str, found: SearchResult) -> str:
+    """Return that a cause is of another form than its equation, if that is likely."""
+    drawn = any(
+        one.form_of == name for one in found.curves[:1] if found.log_posterior(one) > found.log_posterior(found.best)
+    )
+    if not drawn and found.best.beside.forms.get(name, 0.0) < OTHER_FORM:
+        return ""
+    return f"; of another form than {effects.by_id(name).formula}: the sizes are those of the nearest of that form"
 
 
 def _weight(name: str, found: SearchResult, shares: dict[str, float], matters: set[str]) -> str:

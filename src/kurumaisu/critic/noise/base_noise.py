@@ -80,6 +80,8 @@ _HINTED_LASTING = (0.5, 1.0)  # of what lasts, which are tried with each time co
 _HINTED_TAU = (0.5, 2.0, 8.0)
 # [nat] from which a second colour is believed: it has four parameters; noise at rest and errors that last, too
 _WORTH = 4.0
+_ALIKE = 0.08  # share by which a parameter may differ and be the same; about what a few minutes tell
+_NOTHING = 3e-4
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
 
 
@@ -108,6 +110,12 @@ def whitened(drive: Drive, columns: FloatArray, noise: Noise) -> tuple[FloatArra
     """Return L^-1 X for columns X (3 m, k), L L' their covariance, and its log determinant in parts (m, 3)."""
     made = whitener(drive, noise)
     return made.whiten(columns), made.log_determinants
+
+
+def alike(one: Noise, other: Noise) -> bool:
+    """Tell whether two noises differ by no more than a recording can tell: nothing is weighed anew for that."""
+    pairs = [(getattr(one, name), getattr(other, name)) for name in vars(one)]
+    return all(abs(a - b) <= max(_ALIKE * max(abs(a), abs(b)), _NOTHING) for a, b in pairs)
 
 
 @dataclass(frozen=True)

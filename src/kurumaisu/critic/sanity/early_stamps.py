@@ -12,8 +12,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.engine import coarsened_posterior, search
-from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.engine.evidence import Problem, log_posterior
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
@@ -39,8 +39,8 @@ def lead(problem: Problem, progress: Progress) -> float:
     if by < _LEAST:
         return 0.0
     found, other = search.search(problem, progress), search.search(_later(problem, by), progress)
-    won = coarsened_posterior.of_set(other, other.best) - coarsened_posterior.of_set(found, found.best)
-    return by if won > _WIN * coarsened_posterior.variance(found) else 0.0
+    won = log_posterior(other.best, len(other.p)) - log_posterior(found.best, len(found.p))
+    return by if won > _WIN else 0.0
 
 
 def restamped(drive: Drive, by: float) -> Drive:

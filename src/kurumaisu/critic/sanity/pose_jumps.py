@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.sanity.headings import position_noise
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.types import FloatArray
@@ -42,7 +43,7 @@ def _position(pose: Series, slack: float, command: Series | None) -> str | None:
         return None
     i = lasting[0]
     size = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
-    return f"the reference pose jumps {_times(lasting)} (first: {size:.2g} m at t = {pose.t[i]:.6g} s): relocalised?"
+    return f"the reference pose jumps {_times(lasting)} (first: {size:.2g} m at t = {moment(pose.t[i])}): relocalised?"
 
 
 def _heading(pose: Series) -> str | None:
@@ -55,7 +56,7 @@ def _heading(pose: Series) -> str | None:
     odd = np.array([i for i in odd if i >= 4 and _lasts(theta, int(i))], dtype=int)
     if not len(odd) or float(np.median(usual)) > _TURN:
         return None
-    first = f"first: {step[odd[0]]:+.3g} rad at t = {pose.t[odd[0] + 1]:.6g} s"
+    first = f"first: {step[odd[0]]:+.3g} rad at t = {moment(pose.t[odd[0] + 1])}"
     if bool((np.abs(np.abs(step[odd]) - np.pi) < _HALF).all()):
         return (
             f"heading of the reference pose jumps {_times(list(odd))} by half a turn ({first}): "

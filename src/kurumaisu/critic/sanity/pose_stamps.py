@@ -15,7 +15,8 @@ _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
 _LEAST = 40  # intervals while driving
 _CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
-_JITTER = 0.05  # [s] rms of a stamp's error, from which it is more than rows written on a grid
+_MOSTLY = 0.8  # share of the rows by which stamps are judged
+_JITTER = 0.05  # [s] of their error, from which it is more than rows written on a grid
 _TRUE = 0.7  # of the stamps' variation that the way follows, below which
 _SURE = 4.0  # standard errors away from it the stamps are wrong
 
@@ -31,20 +32,20 @@ def problem(pose: Series) -> str | None:
     if rows is None:
         return None
     longer, further = rows
-    wander = float(np.std(np.cumsum(longer)))  # of stamps from even ones
-    if wander < _JITTER:
-        return None
+    wander = float(np.quantile(np.abs(np.cumsum(longer)), _MOSTLY))  # of stamps from even ones, but for a few
     energy = float(longer @ longer)
+    if wander < _JITTER or energy == 0:
+        return None
     follows = float(longer @ further) / energy
-    left = further - follows * longer
-    error = float(np.sqrt(np.sum((longer * left) ** 2))) / energy  # whatever the residuals' spread
+    left = (further - follows * longer) / (1 - longer**2 / energy)  # of a fit without that interval: none decides alone
+    error = float(np.sqrt(np.sum((longer * left) ** 2))) / energy
     jitter = (1 - follows) * wander
     if jitter < _JITTER or follows + _SURE * error > _TRUE:
         return None
     return (
         f"stamps of the reference pose look like times of arrival: for poses {np.diff(new.t).min():.2g} to "
         f"{np.diff(new.t).max():.2g} s apart, the distance follows their times only by {max(follows, 0.0):.2f} (true "
-        f"stamps: 1), as if they were off by {jitter:.2g} s rms; record the time of measurement, or drop delayed poses"
+        f"stamps: 1), as if they were off by {jitter:.2g} s; record the time of measurement, or drop delayed poses"
     )
 
 

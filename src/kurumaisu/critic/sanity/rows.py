@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.sanity.rates import Rates
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -24,7 +25,7 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
         return None
     much = np.where(known, size, 0.0) > 0.5 * float(np.quantile(size[known & (size > 0.02)], 0.75))
     still = _still(pose)
-    starts, ends = _runs(still)
+    starts, ends = stretches(still)
     worst, at, total = 0.0, 0.0, 0.0
     for a, b in zip(starts, ends, strict=True):
         inside = (asked.t > pose.t[a]) & (asked.t < pose.t[b])
@@ -36,7 +37,7 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
         return None
     return (
         f"the reference pose stands still, to the last bit, for {total:.3g} s while the input commands motion (longest "
-        f"{worst:.3g} s, from t = {at:.6g} s): frozen; cut these rows out"
+        f"{worst:.3g} s, from t = {moment(at)}): frozen; cut these rows out"
     )
 
 
@@ -44,7 +45,7 @@ def _still(pose: Series) -> BoolArray:
     return np.asarray((np.diff(pose.values[:, :3], axis=0) == 0).all(axis=1))
 
 
-def _runs(flags: BoolArray) -> tuple[IntArray, IntArray]:
+def stretches(flags: BoolArray) -> tuple[IntArray, IntArray]:
     """Return first and last row of every stretch of rows that are equal."""
     edges = np.diff(np.r_[False, flags, False].astype(int))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
@@ -59,7 +60,7 @@ def repeats(pose: Series, driven: Rates) -> float:
     still = _still(pose)
     speed = np.nan_to_num(np.abs(driven.values)).max(axis=1)
     asked = pose.t[:-1].copy()
-    for a, b in zip(*_runs(still), strict=True):
+    for a, b in zip(*stretches(still), strict=True):
         asked[a:b] = 0.5 * (pose.t[a] + pose.t[b])
     moving = np.interp(asked, driven.t, speed) > MOVING
     if moving.sum() < 20 or not _exact(pose):
@@ -89,15 +90,15 @@ def blocks(part: Series, name: str) -> str | None:
     again = earlier < index
     changes = np.r_[False, (np.diff(rows, axis=0) != 0).any(axis=1)]
     follows = again & np.r_[False, (np.diff(earlier) == 1) & again[:-1]] & changes
-    starts, ends = _runs(follows)
+    starts, ends = stretches(follows)
     lengths = ends - starts
     if not len(lengths) or lengths.max() < _BLOCK:
         return None
     k = int(np.argmax(lengths))
     row, source = int(starts[k]) - 1, int(earlier[starts[k]]) - 1
     return (
-        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {part.t[row]:.6g} s on equal "
-        f"those from t = {part.t[source]:.6g} s on; {int(follows.sum())} in total; cut them out"
+        f"rows of {name} repeat earlier ones exactly: {int(lengths[k]) + 1} rows from t = {moment(part.t[row])} on "
+        f"equal those from t = {moment(part.t[source])} on; {int(follows.sum())} in total; cut them out"
     )
 
 

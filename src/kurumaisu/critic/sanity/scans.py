@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import FloatArray, IntArray
 
@@ -47,7 +48,7 @@ def _stuck(scan: Series, pose: Series | None) -> str | None:
         return None
     first = float(scan.t[:-1][moved & same][0])
     return (
-        f"{same[moved].mean():.0%} of the scans equal the one before while the robot moves (first: t = {first:.6g} s)"
+        f"{same[moved].mean():.0%} of the scans equal the one before while the robot moves (first: t = {moment(first)})"
     )
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from kurumaisu.critic.base.drive import LONGEST
+from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Run
 
 _SPARSE = 10.0  # [s] for each row, on the mean: nothing is recorded as rarely
@@ -20,5 +21,5 @@ def problems(run: Run) -> list[str]:
     span, rows = last[2] - first[1], sum(count for *_, count in ends)
     if span <= LONGEST or (span <= _SPARSE * rows and span <= _ENDLESS):
         return []
-    ends_at = f"from t = {first[1]:.6g} s of {first[0]} to t = {last[2]:.6g} s of {last[0]}"
+    ends_at = f"from t = {moment(first[1])} of {first[0]} to t = {moment(last[2])} of {last[0]}"
     return [f"lasts {span:.6g} s, {ends_at}, and has {rows} rows: some stamps are wrong, or of another clock"]

@@ -18,7 +18,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.base.sensitivity import Sensitivity
-from kurumaisu.critic.engine.evidence import Fit, Problem
+from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
 from kurumaisu.critic.unknown.offset import OFFSET_CHANNELS, constant_offset
 from kurumaisu.critic.unknown.periods import wave_period
@@ -32,8 +32,32 @@ _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)])
 # What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again, and so would
 # how the way bends over the speed.
 _BRAKES = {
-    "v_gain": ("w", "abs_w", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
-    "w_gain": ("v", "abs_v", "v_times_w", "time", "since_command", "since_reversal", "heading", "distance", "x", "y"),
+    "v_gain": (
+        "w",
+        "abs_w",
+        "v_times_w",
+        "time",
+        "since_command",
+        "since_rest",
+        "since_reversal",
+        "heading",
+        "distance",
+        "x",
+        "y",
+    ),
+    "w_gain": (
+        "v",
+        "abs_v",
+        "v_times_w",
+        "time",
+        "since_command",
+        "since_rest",
+        "since_reversal",
+        "heading",
+        "distance",
+        "x",
+        "y",
+    ),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
     "speed": ("time", "heading", "x", "y"),
 }
@@ -79,6 +103,7 @@ class Design:
                 self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
                 at += 1
         self.columns = columns(problem, settings, self.curves)
+        self.grams = [self.columns[:, c.columns].T @ self.columns[:, c.columns] for c in self.curves]
 
 
 def _channels(covariate: str) -> Iterator[str]:
@@ -112,31 +137,15 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
     return out
 
 
-def without_own_span(problem: Problem, fit: Fit, of: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the residual at a fit and columns `of`, both without what the fit's own parameters could take up."""
-    y, own = own_span(problem, fit)
-    return y, of - own @ (own.T @ of)
-
-
-def own_span(problem: Problem, fit: Fit) -> tuple[FloatArray, FloatArray]:
-    """Return the residual at a fit without what its own parameters could take up, and an orthonormal basis of that."""
-    y, slopes = problem.linearised(fit.terms, fit.values, fit.terms)
-    if not slopes.shape[1]:
-        return y, slopes
-    left, sizes, _ = np.linalg.svd(slopes, full_matrices=False)
-    own = left[:, sizes > 1e-6 * max(sizes[0], 1e-12)]
-    return y - own @ (own.T @ y), own
-
-
 def curve_evidence(gram: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> CurveEvidence:
     """Return how much a curve explains: b = X'y, gram = X'X of its whitened columns; any of the priors may hold."""
-    return curve_evidences(gram[None], b[None], priors)[0]
+    return curve_evidences(gram[None], b[None], np.stack(priors)[None])[0]
 
 
-def curve_evidences(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArray]) -> list[CurveEvidence]:
-    """Return how much each of several curves (n, k, k), (n, k) explains."""
-    count = len(priors)
-    scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), np.tile(np.stack(priors), (len(grams), 1, 1)))
+def curve_evidences(grams: FloatArray, b: FloatArray, priors: FloatArray) -> list[CurveEvidence]:
+    """Return how much each of several curves (n, k, k), (n, k) explains; priors (n, p, k, k), any of which may hold."""
+    count = priors.shape[1]
+    scaled, axes, sizes = _axes(np.repeat(grams, count, axis=0), priors.reshape(-1, *priors.shape[2:]))
     nats = _nats(sizes, (axes.transpose(0, 2, 1) @ np.repeat(b, count, axis=0)[..., None])[..., 0])
     weighed = (nats + _LOG_WEIGHTS).reshape(len(grams), -1)
     best = np.argmax(weighed, axis=1)
@@ -144,22 +153,6 @@ def curve_evidences(grams: FloatArray, b: FloatArray, priors: Sequence[FloatArra
     rows = count * np.arange(len(grams)) + best // len(_SIZES)
     found = zip(totals, rows, best % len(_SIZES), strict=True)
     return [CurveEvidence(float(total), _SIZES[size] ** 2 * scaled[row]) for total, row, size in found]
-
-
-def null_evidence(design: Design, columns: FloatArray, draws: int) -> FloatArray:
-    """Return the evidence of the best curve in draws of b ~ N(0, G), noise on this very design, (draws,) [nat]."""
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    b = np.random.default_rng(0).standard_normal((draws, len(root))) @ root.T
-    best = np.full(draws, -np.inf)
-    for curve in design.curves:
-        own = columns[:, curve.columns]
-        parts = [
-            logsumexp(_nats(sizes, b[:, curve.columns] @ axes) + _LOG_WEIGHTS, axis=-1)
-            for axes, sizes in zip(*_axes(own.T @ own, curve.basis.priors)[1:], strict=True)
-        ]
-        best = np.maximum(best, logsumexp(parts, axis=0) - np.log(len(parts)))
-    return best
 
 
 def _axes(gram: FloatArray, priors: Sequence[FloatArray] | FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidence, own_span
+from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidence
 
 
 def fine_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, CurveEvidence]]:
@@ -21,9 +21,8 @@ def fine_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator
     motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
     fine = [(curve, curve.basis.fine(motions)) for curve in curves if curve.basis.size > 1]
     finer = [replace(curve, basis=basis) for curve, basis in fine if basis is not None]
-    y, own = own_span(problem, fit)
-    free = columns(problem, fit.settings, finer)
-    free -= own @ (own.T @ free)
+    y = fit.beside.covariance.whiten(fit.beside.residual)
+    free = fit.beside.white(columns(problem, fit.settings, finer))
     ends = np.cumsum([curve.basis.size for curve in finer])
     for curve, end in zip(finer, ends, strict=True):
         here = slice(end - curve.basis.size, end)

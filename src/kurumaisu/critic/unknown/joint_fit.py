@@ -100,17 +100,11 @@ def refitted(extension: FitWithCurve, drives: Sequence[Drive], problem: Problem)
     return fit_with_curve(other, fit, extension.curve, extension.prior)
 
 
-def simulated_columns(problem: Problem, drive: Drive, extension: FitWithCurve, *, finer: bool) -> FloatArray:
-    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k).
-
-    finer: with more knots. What few of them leave of a step grows with the rates, and is no noise that does.
-    """
+def simulated_columns(problem: Problem, drive: Drive, extension: FitWithCurve) -> FloatArray:
+    """Return the derivative of a drive's increments by all effects of the catalogue and by the curve, (3 m, k)."""
     own = problem.changed(model=replay.extend(problem.model, [extension.unknown]))
     known = own.simulated_columns(drive, extension.fit)
-    curve = extension.curve
-    if finer:
-        curve = replace(curve, basis=extension.basis.finer())
-    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [curve])])
+    return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
 
 
 def doubt(problem: Problem, drive: Drive, extension: FitWithCurve) -> FloatArray:

@@ -32,6 +32,7 @@ COVARIATES = {
     "time": ("time", "time since the start", "s"),
     effects.RECORDING_TIME: (effects.RECORDING_TIME, "time since the first run began", "s"),
     "since_command": ("time_since_command", "time since the command changed", "s"),
+    "since_rest": ("time_since_rest", "time since the chair last rested", "s"),
     "since_reversal": ("distance_since_reversal", "distance since the last reversal", "m"),
     "heading": ("heading", "heading", "rad"),
     "distance": ("distance", "distance travelled", "m"),

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import FINER, Basis
-from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidences, own_span
+from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidences
 from kurumaisu.types import FloatArray
 
 _PLACES = 24  # with as many samples between them
@@ -74,7 +74,7 @@ class _StepPlaces:
     def add(self, gram: FloatArray, b: FloatArray) -> None:
         """Weigh the places by normal equations of a column of ones and one for each, and choose closer ones."""
         grams, pulls = _two_sided(gram, b)
-        found = curve_evidences(grams, pulls, _PRIORS)
+        found = curve_evidences(grams, pulls, np.repeat(np.stack(_PRIORS)[None], len(grams), axis=0))
         seen = np.einsum("nii->ni", grams).min(axis=1) > _SEEN * gram[0, 0]
         nats = np.where(seen, [belief.nats for belief in found], -np.inf)
         best = int(np.argmax(nats))
@@ -132,14 +132,13 @@ def gains_over_own_rate(curves: Iterable[Curve]) -> Iterator[Curve]:
 def step_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, CurveEvidence]]:
     """Yield, for each of the curves beside a fit that has knots, the one that jumps instead, and what it explains."""
     tried = list(_first(problem, fit, curves))
-    y, own = own_span(problem, fit)
+    y = fit.beside.covariance.whiten(fit.beside.residual)
     for _ in range(3):
         sides = [
             replace(one.curve, basis=_Sides(one.curve.basis.covariate, one.places, one.curve.basis.constants, (), 0, 0))
             for one in tried
         ]
-        free = columns(problem, fit.settings, sides)
-        free -= own @ (own.T @ free)
+        free = fit.beside.white(columns(problem, fit.settings, sides))
         ends = np.cumsum([side.basis.size for side in sides])
         for one, side, end in zip(tried, sides, ends, strict=True):
             part = free[:, end - side.basis.size : end]
@@ -154,7 +153,8 @@ def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Ste
         if not len(curve.basis.knots):
             continue
         values = np.concatenate([curve.basis.samples(m)[moved] for m, moved in zip(motions, moving, strict=True)])
-        known = np.unique(np.quantile(values[np.isfinite(values)], np.linspace(0.0, 1.0, _PLACES + 1)))
+        finite = values[np.isfinite(values)]  # none where beside these effects the chair never rests, say
+        known = np.unique(np.quantile(finite, np.linspace(0.0, 1.0, _PLACES + 1))) if len(finite) else finite
         if len(known) > 1:  # between values that were driven: at one of them it is not known which side it is on
             yield _StepPlaces(curve, (known[1:] + known[:-1]) / 2, 0.0)
 

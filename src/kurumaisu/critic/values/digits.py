@@ -42,6 +42,11 @@ def with_interval(estimate: float, low: float, high: float, unit: str) -> str:
     return f"{cells[0]} (90 %: {bare(cells[1])} to {cells[2]})"
 
 
+def moment(t: float) -> str:
+    """Return a time by a run's clock to the millisecond, so that its row can be found: of a Unix time, too."""
+    return f"{f'{t:.3f}'.rstrip('0').rstrip('.')} s"
+
+
 def odds(nats: float) -> str:
     """Return how many times as probable a log evidence makes something, to one digit or as a power of ten."""
     if nats < math.log(1e4):

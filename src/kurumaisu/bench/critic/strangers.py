@@ -1,0 +1,242 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The critic on recordings by generators whose authors have not seen it: one table of figures with their floors."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+
+from kurumaisu.bench.hidden.score import SURE, calibration_error
+from kurumaisu.bench.processes import cpu_time
+from kurumaisu.bench.table import Table
+from kurumaisu.critic import pipeline
+from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.prediction import Prediction
+from kurumaisu.critic.values.verdict import Verdict
+from kurumaisu.errors import Error
+from kurumaisu.params import shipped
+
+GENERATORS = ("brook", "motors", "cliff", "dune")
+KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
+_Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
+_NAMED = 0.9
+_Q = 0.5  # of a query's error beyond the model's own, in nats, a prediction that is worse
+
+
+@dataclass(frozen=True)
+class Case:
+    """One recording: what its author hid, what was said, what queries gained as a share of the oracle's, CPU [s]."""
+
+    truth: Mapping[str, Any]
+    verdict: Verdict | None
+    gain: float | None
+    worse: bool
+    cpu: float
+
+    @property
+    def ids(self) -> set[str]:
+        """Return the causes that act."""
+        return {cause["id"] for cause in self.truth["causes"]}
+
+    @property
+    def named(self) -> set[str]:
+        """Return the causes that were named, but for what is always neutral."""
+        causes = self.verdict.causes if self.verdict is not None else ()
+        return {cause.id for cause in causes if cause.p >= _NAMED} - set(self.truth["neutral"])
+
+    @property
+    def right(self) -> bool:
+        """Tell whether the answer is what the kind of case calls for."""
+        verdict, kind = self.verdict, self.truth["kind"]
+        if verdict is None:
+            return kind == "wrong"
+        if kind == "wrong":
+            return verdict.verdict == "invalid_data"
+        if kind == "unknown":
+            return verdict.verdict == "unknown"
+        if kind == "confounded":
+            return any(self.ids & set(group) for group in verdict.confounded) or self.named == self.ids
+        told = self.named == self.ids and not verdict.unknown and verdict.verdict != "invalid_data"
+        return told and not (kind == "null" and verdict.confounded)
+
+    @property
+    def strong(self) -> bool:
+        """Tell whether what is hidden shows as clearly as the floors ask for."""
+        least = _BESIDE if self.truth["kind"] in ("single", "form") else _BESIDE_OTHERS
+        return all(cause["z"] >= _Z and cause["beside"] >= least for cause in self.truth["causes"])
+
+    @property
+    def followed(self) -> bool:
+        """Tell whether one of the first three curves is over what the unknown follows."""
+        accepted = (self.truth["unknown"] or {}).get("covariates", ())
+        said = (
+            [one.covariate.replace("|", "abs_", 1).replace("|", "") for one in self.verdict.unknown[:3]]
+            if self.verdict
+            else []
+        )
+        return any(name in said or f"time_{name}" in said or f"distance_{name}" in said for name in accepted)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A recording to make and to criticise."""
+
+    generator: str
+    kind: str
+    seed: int
+    folder: Path
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table of one generator."""
+    parser = argparse.ArgumentParser(prog="scripts/bench strangers", description=__doc__)
+    parser.add_argument("--generator", choices=GENERATORS, default="cliff")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
+    parser.add_argument("--draws", type=int, default=20, help="recordings of each kind")
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--jobs", type=int, default=2, help="processes")
+    parser.add_argument("--folder", type=Path, default=Path("out/strangers"), help="where the recordings are kept")
+    parser.add_argument("--cases", action="store_true", help="a line for each recording")
+    options = parser.parse_args(arguments)
+    seeds = range(options.seed, options.seed + options.draws)
+    jobs = [Job(options.generator, kind, seed, options.folder) for seed in seeds for kind in options.kinds]
+    cases = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for job, case in zip(jobs, pool.map(_case, jobs), strict=True):
+            cases.append(case)
+            if options.cases:
+                print(f"{'ok   ' if case.right else 'WRONG'} {job.kind}-{job.seed}: {_words(case)}", flush=True)
+            elif sys.stderr.isatty():
+                print(f"\r{len(cases)} of {len(jobs)}", end="", file=sys.stderr)
+    _table(options.generator, cases)
+    return 0
+
+
+def _case(job: Job) -> Case:
+    """Make a recording if it is not there, and criticise it."""
+    where = job.folder / job.generator / f"{job.kind}-{job.seed}"
+    if not (where / "truth.json").exists():
+        where.mkdir(parents=True, exist_ok=True)
+        import_module(f"kurumaisu.bench.strangers.{job.generator}").make(where, job.kind, job.seed)
+    truth = json.loads((where / "truth.json").read_text(encoding="utf-8"))
+    start = cpu_time()
+    try:
+        found = pipeline.criticise(read_recording(where / "recording"), shipped("launch/md100.yaml"), lambda _: None)
+    except Error:
+        return Case(truth, None, None, worse=False, cpu=cpu_time() - start)
+    gain, worse = _gained(where / "answers.csv", found)
+    return Case(truth, found.verdict, gain, worse, cpu_time() - start)
+
+
+def _gained(path: Path, found: Criticism) -> tuple[float | None, bool]:
+    """Return the gain on queries as a share of the true causes', and whether it predicts worse than the model."""
+    said = {key: value for prediction in found.predictions for key, value in _said(prediction)}
+    model = oracle = ours = 0.0
+    with path.open(encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            key = row["run"], row["channel"], round(float(row["t0"]), 3), round(float(row["t1"]), 3), int(row["beam"])
+            mean, sd = said.get(key, (np.nan, np.nan))
+            if np.isfinite(mean) and np.isfinite(sd):
+                value = float(row["value"])
+                model += _density(value, float(row["base_mean"]), float(row["base_sd"]))
+                oracle += _density(value, float(row["oracle_mean"]), float(row["oracle_sd"]))
+                ours += _density(value, mean, sd)
+    share = (ours - model) / (oracle - model) if oracle - model > 1.0 else None
+    return share, ours < model - _Q
+
+
+def _said(prediction: Prediction) -> Iterator[tuple[tuple[str, str, float, float, int], tuple[float, float]]]:
+    """Yield run, channel, times and beam, as answers.csv has them, with mean and sd."""
+    run, t0, t1 = prediction.run, round(prediction.t0, 3), round(prediction.t1, 3)
+    for i, (mean, sd) in enumerate(zip(prediction.means.tolist(), prediction.sds.tolist(), strict=True)):
+        channel, beam = ("range", i) if prediction.is_scan else (("dx", "dy", "dtheta")[i], -1)
+        yield (run, channel, t0, t1, beam), (mean, sd)
+
+
+def _density(value: float, mean: float, sd: float) -> float:
+    return -0.5 * ((value - mean) / sd) ** 2 - float(np.log(sd))
+
+
+def _share(hit: Callable[[Case], bool], cases: Sequence[Case]) -> str:
+    """Return a share with its exact 95 % interval."""
+    n, k = len(cases), sum(map(hit, cases))
+    if not n:
+        return "-"
+    low = beta.ppf(0.025, k, n - k + 1) if k else 0.0
+    high = beta.ppf(0.975, k + 1, n - k) if k < n else 1.0
+    return f"{k / n:.2f} ({low:.2f}-{high:.2f}) of {n}"
+
+
+def _table(generator: str, cases: Sequence[Case]) -> None:
+    table = Table(f"The critic on {generator}", "figure", "floor     ", "value, exact 95 % interval")
+    for label, floor, value in _rows(cases):
+        table.row(label, floor, value)
+
+
+def _rows(cases: Sequence[Case]) -> Iterator[tuple[str, str, str]]:
+    of = {kind: [case for case in cases if case.truth["kind"] == kind] for kind in KINDS}
+    strong = {kind: [case for case in of[kind] if case.strong] for kind in KINDS}
+    right = partial(_share, lambda case: case.right)
+    yield "alarms on nulls", "<= .03", _share(lambda case: not case.right, of["null"])
+    for kind, floor in (("single", ">= .92"), ("form", ">= .88"), ("pair", ">= .88"), ("triple", ">= .80")):
+        yield f"{kind}: right", floor, right(strong[kind])
+    yield "outside the catalogue: flagged", ">= .90", right(of["unknown"])
+    yield "outside the catalogue: misnamed", "<= .05", _share(lambda case: bool(case.named), of["unknown"])
+    yield "outside the catalogue: covariate", ">= .75", _share(lambda case: case.followed, of["unknown"])
+    yield "confounded sets", ">= .93", right(strong["confounded"])
+    sets = [case for case in cases if case.verdict is not None and case.verdict.confounded]
+    yield "with the next experiment", "all", _share(lambda case: case.verdict.next_experiment is not None, sets)  # type: ignore[union-attr]
+    yield "wrong data recognised", ">= .95", right(of["wrong"])
+    stated = [
+        (cause.p, cause.id in case.ids)
+        for case in cases
+        if case.verdict
+        for cause in case.verdict.causes
+        if cause.id not in case.truth["neutral"]
+    ]
+    sure = [hit for p, hit in stated if p >= SURE]
+    yield "right when p >= .95", ">= .97", f"{np.mean(sure):.2f} of {len(sure)}" if sure else "-"
+    yield "calibration error", "<= .04", f"{calibration_error(stated):.3f}"
+    held = list(_covered(cases))
+    yield "90 % intervals hold the truth", ".85-.95", f"{np.mean(held):.2f} of {len(held)}" if held else "-"
+    gains = [case.gain for case in strong["single"] + strong["form"] if case.gain is not None]
+    if gains:
+        yield "gain on queries: median", ">= .95", f"{np.median(gains):.2f} of {len(gains)}"
+        yield "gain on queries: lowest tenth", ">= .6", f"{np.quantile(gains, 0.1):.2f}"
+    yield "nulls predicted worse", "<= .05", _share(lambda case: case.worse, of["null"])
+    yield "CPU [s], median and most", "", f"{np.median([c.cpu for c in cases]):.0f}, {max(c.cpu for c in cases):.0f}"
+
+
+def _covered(cases: Sequence[Case]) -> Iterator[bool]:
+    for case in cases:
+        true = {cause["id"]: cause.get("parameters") or {} for cause in case.truth["causes"]}
+        for cause in case.verdict.causes if case.verdict else ():
+            for name, value in true.get(cause.id, {}).items():
+                if name in cause.parameters:
+                    yield cause.parameters[name].lo90 <= value <= cause.parameters[name].hi90
+
+
+def _words(case: Case) -> str:
+    hidden = " ".join(
+        f"{c['id']}{'*' * (c['form'] == 'other')} (z {c['z']:.0f}/{c['beside']:.0f})" for c in case.truth["causes"]
+    )
+    hidden += f" {case.truth['unknown']}" if case.truth["unknown"] else f" {case.truth['wrong'] or ''}"
+    if case.verdict is None:
+        return f"{hidden} | refused | {case.cpu:.0f} s"
+    said = " ".join(f"{cause.id} {cause.p:.2f}" for cause in case.verdict.causes)
+    said += "".join(f" {{{', '.join(group)}}}" for group in case.verdict.confounded)
+    said += "".join(f" ?{one.channel} over {one.covariate} {one.p:.2f}" for one in case.verdict.unknown)
+    return f"{hidden} | {case.verdict.verdict} {said} | {case.cpu:.0f} s"

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Something is surely wrong, and the data do not say what: amber, never green.
+
+Drives held out tell it: what was found, though nobody can name it, predicts them better; or the model leaves them
+farther off than the noise allows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.heldout import drive_gain
+from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.verdict import Gain, Unknown
+from kurumaisu.types import FloatArray
+
+COVARIATE = "unresolved"
+_P = 0.5  # that any cause that could be told is it
+_LEAST = 5.0  # [nat] of evidence for what cannot be named
+_FAR = 0.02  # share of the way or turn that it moves the chair
+_LOUDER = 1.5  # times the variance that the noise has, beyond which drives held out are not understood
+_SURE = 0.99  # of the blocks drawn again
+_DRAWS = 500
+
+
+def with_unresolved(
+    criticism: Criticism, made: Decision, gain: Gain | None, shares: dict[str, float], held_out: Sequence[Drive]
+) -> Criticism:
+    """Return a criticism that says so where it would say that nothing is wrong; shares: moved by each effect."""
+    if criticism.verdict.verdict != "none":
+        return criticism
+    found = made.found
+    nats = found.best.score - found.empty.score
+    share = max(shares.values(), default=0.0)
+    if gain is not None and gain.log_density_per_sample.lo90 > 0 and nats >= _LEAST and share >= _FAR:
+        nearest = " with ".join(sorted(found.best.ids))
+        words = (
+            f"Something is wrong: after 2 s the chair is off by {100 * share:.0f} % of the way or turn, and held-out "
+            f"data confirm it; but these data do not say what it is. Nearest is {nearest} "
+            f"(--only {','.join(sorted(found.best.ids))})."
+        )
+        return _amber(criticism, f"off by {100 * share:.0f} % of the way or turn after 2 s; nearest {nearest}", words)
+    louder = least_variance(made.problem, held_out)
+    if louder > _LOUDER:
+        times = float(np.sqrt(louder))
+        words = (
+            f"Something is wrong, and nobody can say what: held-out motion is off at least {times:.1f} times as far as "
+            f"the noise that was estimated allows."
+        )
+        return _amber(criticism, f"held-out motion off {times:.1f} times as far as noise allows", words)
+    return criticism
+
+
+def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
+    """Return how many times the noise's variance the model criticised leaves of drives, at least; 0 of none."""
+    blocks = [block for drive in drives for block in _squares(problem, drive)]
+    if len(blocks) < 2:
+        return 0.0
+    sums = np.array([[block.sum(), len(block)] for block in blocks])
+    rng = np.random.default_rng(0)
+    drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=_DRAWS) @ sums
+    return float(np.quantile(drawn[:, 0] / drawn[:, 1], 1 - _SURE))
+
+
+def _squares(problem: Problem, drive: Drive) -> list[FloatArray]:
+    """Return the squares of what is left of a drive, whitened, in blocks of some seconds."""
+    left = (drive.measured - problem.simulated(drive, ())).reshape(-1, 1)
+    white = problem.whitened(drive, left).reshape(-1, 3)
+    index = ((drive.times[1:] - drive.times[0]) // drive_gain.BLOCK).astype(int)
+    return [(white[index == i] ** 2).ravel() for i in np.unique(index)]
+
+
+def _amber(criticism: Criticism, shape: str, words: str) -> Criticism:
+    unknown = Unknown("base", COVARIATE, shape, _P)
+    verdict = replace(criticism.verdict, verdict="unknown", unknown=(unknown,))
+    return replace(criticism, verdict=verdict, story=replace(criticism.story, headline=words))

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Times in which the chair was held: it stands while it is asked to move as it does elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kurumaisu import geometry
+from kurumaisu.critic.base.drive import GRID, prepare
+from kurumaisu.critic.sanity.rows import stretches
+from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.errors import Error
+from kurumaisu.params import Model
+from kurumaisu.types import BoolArray, FloatArray
+
+TOPIC = "collision"  # a quantity that says so itself
+_ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
+_STANDS = 0.15  # share of that below which it stands
+_BEFORE = 0.6  # [s] for which it must have been asked
+_WINDOW = 0.4  # [s] over which its rates are taken
+_LEAST = 0.6  # [s] of standing
+_LIKE = (0.7, 1.4)  # times what is asked for, of which it is known what the chair does elsewhere
+_MOVES = 0.7  # share of that time in which it moves, at least
+_MARGINS = (0.4, 1.0)  # [s] before and after, in which it is stopped, and gets going again
+
+
+def contacts(run: Run, model: Model) -> tuple[tuple[float, float], ...]:
+    """Return the spans of time [s] in which the chair was held, by a quantity that says so, else by its motion."""
+    spans = _said(run.covariates[TOPIC]) if TOPIC in run.covariates else _seen(run, model)
+    return _merged([(a - _MARGINS[0], b + _MARGINS[1]) for a, b in spans])
+
+
+def _said(series: Series) -> Iterator[tuple[float, float]]:
+    """Yield the spans in which a quantity is not 0; each value holds until the next."""
+    ends = np.append(series.t[1:], series.t[-1])
+    for a, b in zip(*stretches(series.values[:, 0] != 0), strict=True):
+        yield float(series.t[a]), float(ends[b - 1])
+
+
+def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
+    if run.pose is None or run.pose_source != "measured":
+        return
+    try:
+        drive = prepare(run, model)
+    except Error:
+        return
+    t = drive.start + GRID * np.arange(len(drive.v))
+    after = np.clip(np.searchsorted(run.pose.t, t), 1, len(run.pose.t) - 1)
+    inside = (t > drive.times[0] + _WINDOW) & (t < drive.times[-1] - _WINDOW)
+    inside &= run.pose.t[after] - run.pose.t[after - 1] < _WINDOW  # nobody knows what is within a gap
+    asked = np.column_stack([drive.v, drive.w])
+    wanted = _held(np.abs(asked) > _ASKED, round(_BEFORE / GRID))
+    driven = np.abs(_rates(run.pose, t))
+    small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
+    stands = inside & wanted.any(axis=1) & (driven < small).all(axis=1)
+    for a, b in zip(*stretches(stands), strict=True):
+        if (b - a) * GRID >= _LEAST and _is_odd(asked[a:b], asked, wanted, stands):
+            yield float(t[a]), float(t[b - 1])
+
+
+def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: BoolArray) -> bool:
+    """Tell whether the chair moves elsewhere when about the same is asked for."""
+    size = np.maximum(np.median(np.abs(here), axis=0), _ASKED)
+    as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
+    alike = wanted.any(axis=1) & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
+    return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
+
+
+def _held(flags: BoolArray, count: int) -> BoolArray:
+    """Return where flags (n, 2) have held for so many samples."""
+    sums = np.vstack([np.zeros(2), np.cumsum(flags, axis=0)])
+    out = np.zeros_like(flags)
+    out[count - 1 :] = sums[count:] - sums[:-count] == count
+    return out
+
+
+def _rates(pose: Series, t: FloatArray) -> FloatArray:
+    """Return the rates v, w (n, 2) about times t (n,)."""
+    before, after = (geometry.interpolate(pose.t, pose.values[:, :3], t + by) for by in (-_WINDOW / 2, _WINDOW / 2))
+    return np.asarray(geometry.between(before, after)[:, [0, 2]] / _WINDOW)
+
+
+def _merged(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    out: list[tuple[float, float]] = []
+    for a, b in sorted(spans):
+        if out and a <= out[-1][1]:
+            out[-1] = out[-1][0], max(out[-1][1], b)
+        else:
+            out.append((a, b))
+    return tuple(out)

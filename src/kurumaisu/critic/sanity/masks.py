@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of a reference that are off for a moment: they are set aside, and the rest is judged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.critic.sanity.contacts import TOPIC, contacts
+from kurumaisu.critic.sanity.pose_jumps import jumps
+from kurumaisu.critic.values.digits import moment, quantities
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.params import Model
+from kurumaisu.types import BoolArray, FloatArray
+
+_BACK = 5.0  # [s] within which a reference that was elsewhere is back
+_SAME = 0.5  # share of a jump that is left when it is back
+_MOST = 0.05  # share of a run's rows that may be set aside
+
+
+def set_aside(recording: Recording, model: Model) -> Recording:
+    """Return a recording without what tells nothing of the chair, with notes of that.
+
+    That are rows of its references that are off for a moment, and times in which the chair was held.
+    """
+    runs, notes = [], []
+    for run in recording.runs:
+        kept, words = _masked(run)
+        held = contacts(kept, model)
+        others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
+        runs.append(replace(kept, contacts=held, covariates=others))
+        notes += [*words, *([_held(kept, held)] if held else [])]
+    return replace(recording, runs=tuple(runs), problems=(*recording.problems, *notes))
+
+
+def _held(run: Run, spans: Sequence[tuple[float, float]]) -> str:
+    """Return in words when and where a chair was held."""
+    (first, end), *more = spans
+    place = ""
+    if run.pose is not None and len(run.pose.t):
+        x, y = (float(np.interp(first, run.pose.t, run.pose.values[:, i])) for i in range(2))
+        place = f", at x {x:.2f}, y {y:.2f} m"
+    others = f", and {len(more)} times more" if more else ""
+    seconds = sum(b - a for a, b in spans)
+    return (
+        f"{run.name}: the chair is held from t = {moment(first)} to {moment(end)}{place}{others}: a contact? "
+        f"{seconds:.1f} s set aside"
+    )
+
+
+def _masked(run: Run) -> tuple[Run, list[str]]:
+    pose = run.pose
+    if pose is None or run.pose_source != "measured":
+        return run, []
+    spans = _elsewhere(pose, run.command)
+    off = np.zeros(len(pose.t), dtype=np.bool_)
+    for first, end, _ in spans:
+        off[first:end] = True
+    if not off.any() or off.mean() > _MOST:
+        return run, []
+    return replace(run, pose=_without(pose, off)), [_told(run.name, pose, spans, off)]
+
+
+def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
+    """Return first row, end and distance [m] of each stretch that is off."""
+    lasting, single = jumps(pose, 1.0, command)
+    step = np.diff(pose.values[:, :2], axis=0)
+    found = [(i, i + 1, float(np.hypot(*step[i - 1]))) for i in single if i + 1 < len(pose.t)]
+    # One that is off alone leaves twice: on its way out, and back.
+    found = [one for k, one in enumerate(found) if not k or one[0] > found[k - 1][0] + 1]
+    away: int | None = None
+    for i in lasting:
+        if away is None:
+            away = i
+        elif pose.t[i] - pose.t[away] < _BACK and _is_back(step[away - 1], step[i - 1]):
+            found.append((away, i, float(np.hypot(*step[away - 1]))))
+            away = None
+        else:
+            away = i
+    return sorted(found)
+
+
+def _is_back(out: FloatArray, back: FloatArray) -> bool:
+    return bool(np.hypot(*(out + back)) < _SAME * np.hypot(*out))
+
+
+def _without(pose: Series, off: BoolArray) -> Series:
+    return Series(pose.t[~off], pose.values[~off], pose.columns)
+
+
+def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: BoolArray) -> str:
+    first, end, far = spans[0]
+    where = (
+        f"t = {moment(float(pose.t[first]))} to {moment(float(pose.t[end - 1]))}"
+        if end > first + 1
+        else f"t = {moment(float(pose.t[first]))}"
+    )
+    more = f", and {len(spans) - 1} more" if len(spans) > 1 else ""
+    return (
+        f"{name}: the reference is {quantities([far], 'm')[0]} off at {where}{more}: "
+        f"{int(off.sum())} of its {len(off)} rows set aside ({100 * off.mean():.2g} %)"
+    )

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Rows of a reference that are off for a moment are set aside, with a note where they are; nothing else is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from phased_drive import phased, recorded
+
+from kurumaisu.critic.sanity import examination, masks
+from kurumaisu.params import load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
+OFF = np.array([0.4, -0.3, 0.0])  # 0.5 m
+UNIX = 1.79e9  # [s] a time of this year
+
+
+def moved(run, rows, by=OFF):
+    """Return a run whose reference is elsewhere in some rows."""
+    values = run.pose.values.copy()
+    values[rows] += by
+    return replace(run, pose=replace(run.pose, values=values))
+
+
+def judged(run):
+    """Return the reference that is left of a run, and what is said."""
+    out = masks.set_aside(recorded(run), MODEL)
+    return out.runs[0].pose, out.problems
+
+
+def assert_without(pose, run, rows):
+    np.testing.assert_array_equal(pose.t, np.delete(run.pose.t, rows))
+    np.testing.assert_array_equal(pose.values, np.delete(run.pose.values, rows, axis=0))
+
+
+@pytest.mark.parametrize("start", [0.0, UNIX])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_row_that_is_off_alone_is_set_aside(seed, start):
+    """The note has the time by the run's clock to the millisecond: 1.79e+09 s would find no row."""
+    run = moved(phased(np.random.default_rng(seed), start=start), [500])
+    pose, (told,) = judged(run)
+    assert_without(pose, run, [500])
+    assert f"off at t = {start + 25.01:.2f} s: 1 of its 1200 rows set aside" in told
+
+
+@pytest.mark.parametrize("start", [0.0, UNIX])
+@pytest.mark.parametrize("seed", range(3))
+def test_an_excursion_of_a_second_is_set_aside(seed, start):
+    rows = np.arange(500, 520)
+    run = moved(phased(np.random.default_rng(seed), start=start), rows)
+    pose, (told,) = judged(run)
+    assert_without(pose, run, rows)
+    assert f"off at t = {start + 25.01:.2f} s to {start + 25.96:.2f} s: 20 of its 1200 rows set aside" in told
+
+
+def test_several_of_them_are_told_in_one_line():
+    rows = [300, *range(500, 510), 800]
+    run = moved(phased(np.random.default_rng(4)), rows)
+    pose, (told,) = judged(run)
+    assert_without(pose, run, rows)
+    assert "at t = 15.01 s, and 2 more: 12 of its 1200 rows set aside (1 %)" in told
+
+
+def test_a_reference_that_stays_elsewhere_is_wrong_data():
+    """Nobody knows which of the two places is right."""
+    run = moved(phased(np.random.default_rng(5), start=UNIX), slice(500, None))
+    pose, told = judged(run)
+    assert (len(pose.t), told) == (1200, ())
+    (line,) = examination.examine(recorded(run), MODEL).invalid
+    assert "jumps once (first: 0." in line
+    assert f"at t = {UNIX + 25.01:.2f} s" in line
+
+
+def test_a_reference_that_is_off_often_is_not_made_a_good_one():
+    run = moved(phased(np.random.default_rng(6)), np.arange(50, 1150, 15))  # one row in sixteen
+    assert judged(run) == (run.pose, ())
+
+
+def test_poses_that_were_worked_out_are_left_as_they_are():
+    run = replace(moved(phased(np.random.default_rng(7)), [500]), pose_source="the odometry")
+    assert judged(run) == (run.pose, ())
+
+
+@pytest.mark.parametrize("rate", [10.0, 20.0])
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
+def test_a_good_reference_is_left_as_it_is(noise, rate):
+    for seed in range(5):
+        run = phased(np.random.default_rng(seed), noise=noise, rate=rate)
+        assert judged(run) == (run.pose, ())
