@@ -83,7 +83,7 @@ def wheels_off(curvature, half, v, w):
 for _name, _rule in {
     "base.gain_v": lambda p, v, w: (v + p["gain"] * v, 0.0, w),
     "base.gain_w": lambda p, v, w: (v, 0.0, w + p["gain"] * w),
-    "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w)),
+    "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w) * (p["side"] * w >= 0)),
     "base.veer": lambda p, v, w: wheels_off(p["curvature"], p["apart"] / 2, v, w),
     "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
     "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),

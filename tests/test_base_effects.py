@@ -272,6 +272,6 @@ def test_values_beyond_the_bounds_are_refused_by_name(effect):
 def test_every_effect_on_the_base_that_is_asked_for_exists():
     ids = """gain_v gain_w veer dead_zone_v dead_zone_w dac_zero_f dac_zero_s dac_quantisation reverse_gain
         left_right_gain curvature_v curvature_w lag_v lag_w delay accel_limit saturation battery_sag understeer
-        lateral_slip slope caster_reversal backlash cross_w_to_v cross_v_to_w marker_x marker_y clock_scale payload
-        process_noise sign steering_law"""
+        lateral_slip slope caster_reversal backlash cross_w_to_v cross_v_to_w marker_x marker_y marker_yaw clock_scale
+        payload process_noise sign steering_law"""
     assert sorted(effect.id for effect in effects.BASE) == sorted(f"base.{name}" for name in ids.split())

@@ -198,7 +198,7 @@ def test_without_poses_and_scans_the_odometry_is_what_commands_are_compared_with
 
 @pytest.mark.parametrize(("near", "verdict"), [(True, "named"), (False, "unknown")])
 def test_what_cannot_be_noise_is_named_where_it_simulates_nearer(monkeypatch, near, verdict):
-    """Though the density of what is held out gains nothing, as where it differs from drive to drive; else it is amber."""
+    """Though the density of what is held out gains nothing, as where it differs from drive to drive; else amber."""
     monkeypatch.setattr(explain, "confirmed", lambda worth, nats: False)
     monkeypatch.setattr(explain, "simulates_nearer", lambda worth, channels: near and simulates_nearer(worth, channels))
     assert criticise(recording("base.gain_w", 0.1, 70, 40.0)).verdict.verdict == verdict

@@ -79,7 +79,7 @@ def driven_by(seed, *settings):
     paths = [replay.path(drive, MODEL, settings) for drive in plain]
     seen = [path + 0.005 * rng.standard_normal(path.shape) for path in paths]
     noisy = [drive.seen_at(drive.times, poses) for drive, poses in zip(plain, seen, strict=True)]
-    ids = frozenset({"base.battery_sag", "base.gain_v", "base.lag_w"})
+    ids = frozenset({"base.battery_sag", "base.gain_v", "base.lag_w", "smooth"})
     return Problem(noisy, MODEL, noise_of(USUAL), ids=ids)
 
 

@@ -204,7 +204,7 @@ def test_a_curve_that_draws_a_strong_cause_as_well_does_not_hide_it(seed):
     """A lever moves the reference sideways in proportion to w, as a curve over w would, and far out of the noise."""
     drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=20.0, rate=10.0)
     data = recordings.recording("lever", drives, [BASE["base.marker_x"].fault({"size": 0.25}, "plain")])
-    ids = frozenset({"base.marker_x", "base.lateral_slip", "base.gain_v"})
+    ids = frozenset({"base.marker_x", "base.lateral_slip", "base.gain_v", "smooth"})
     problem = Problem([prepare(run, MODEL) for run in data.runs], MODEL, noise_of(USUAL), ids=ids)
     found = search.search(problem, lambda _: None)
     assert found.named == ("base.marker_x",)

@@ -175,7 +175,7 @@ BASE = f"position ( pose [-8 0 0 0] size [0.4 0.4 0.2] velocity_bounds [-2 2 0 0
 def test_check_world_says_what_is_no_ramp(tmp_path: Path, text: str, messages: list[str]) -> None:
     path = tmp_path / "t.world"
     path.write_text(WALL + BASE + text)
-    found = [finding.message for finding in findings(load_world(path))]
+    found = [str(finding) for finding in findings(load_world(path))]
     assert len(found) == len(messages)
     for message in messages:
         assert any(message in text for text in found), found

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from kurumaisu import effects
 from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
@@ -117,9 +118,9 @@ def make(kind: Kind, z: float, seed: int, *, seconds: float = 60.0, runs: int = 
 
 
 def problem_of(recording: Recording, ids: frozenset[str] | None = None) -> Problem:
-    """Return the problem of a recording whose noise is known; ids: the effects that may act, None: all."""
+    """Return the problem of a recording whose noise is known; ids: effects that may act beside curves, None: all."""
     drives = [with_covariates(prepare(run, MODEL), run) for run in recording.runs]
-    return Problem(drives, MODEL, USUAL, ids=ids)
+    return Problem(drives, MODEL, USUAL, ids=None if ids is None else ids | {effects.SMOOTH})
 
 
 def norm_between(one: Recording, other: Recording) -> float:

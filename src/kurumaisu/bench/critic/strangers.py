@@ -60,7 +60,7 @@ class Case:
     @property
     def right(self) -> bool:
         """Tell whether the answer is what the kind of case calls for."""
-        verdict, kind = self.verdict, self.truth["kind"]
+        verdict, kind = self.verdict, str(self.truth["kind"])
         if verdict is None:
             return kind == "wrong"
         if kind == "wrong":

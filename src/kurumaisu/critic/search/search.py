@@ -89,6 +89,12 @@ class _Search:
         near = [fit for fit in self.fits.values() if self.score(fit) > self.score(best) - _NEAR]
         for fit in sorted(near, key=self.score, reverse=True)[:_CLOSER]:
             self.curves.closer(fit)
+        best = max(self.fits.values(), key=self.score)
+        if any(one.nats > 0 for one in self.curves.found(best)[:1]):
+            for one in best.candidates:  # beside the closer curve it may be needless
+                rest = self.fits.get(best.candidates - {one})
+                if rest is not None and all(rest is not fit for fit in near):
+                    self.curves.closer(rest)
 
     def _go_on(self) -> None:
         for _ in range(_ROUNDS):
