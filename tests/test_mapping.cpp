@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 #include <string>
+#include <utility>
 
 #include "mapper_values.h"
 #include "mapping_drive.h"
@@ -100,7 +101,7 @@ TEST(Faults, WithFiveOfSixBeamsMissingItIsAsWithASixthOfTheBeams) {
   const auto coarse = blind([](Moment& moment) {
     std::vector<float> ranges;
     for (int i = 0; i < room::kBeams; i += 6) ranges.push_back(moment.scan.ranges[i]);
-    moment.scan.ranges = ranges;
+    moment.scan.ranges = std::move(ranges);
     moment.scan.fan.angle_increment *= 6;
     moment.scan.fan.time_increment *= 6;
   });

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "model/unicycle.h"
 #include "slam/basics/occupancy.h"
 
 namespace kurumaisu {

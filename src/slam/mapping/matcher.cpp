@@ -75,7 +75,7 @@ struct Around {
 /// From one reading to the next [beams]: the median, so that a doorway among them does not count.
 double spacingAround(const std::vector<Reading>& readings, int centre) {
   const Around around(readings, centre);
-  std::array<int, 2 * kLineReadings> gaps{};
+  std::array<int, std::size_t{2} * kLineReadings> gaps{};
   const int count = around.last - around.first - 1;
   if (count < 1) return 1;
   for (int i = 0; i < count; ++i) {
