@@ -37,7 +37,10 @@ const char* nameOf(Knowledge knowledge) {
 }
 
 LocalizationVerdict judge(const LocalizationState& state) {
-  if (!state.clock_problem.empty()) return {2, "LOCALIZATION_NO_CLOCK: " + state.clock_problem};
+  // A node that is behind its scans is behind the clock, too.
+  if (!state.clock_problem.empty() && state.newly_skipped == 0) {
+    return {2, "LOCALIZATION_NO_CLOCK: " + state.clock_problem};
+  }
   if (!state.bad_map.empty()) return {2, "LOCALIZATION_BAD_MAP: " + state.bad_map};
   if (!state.has_map) return {2, "LOCALIZATION_NO_MAP: no map has come"};
   if (!state.missing.empty()) return {2, "LOCALIZATION_NO_TRANSFORM: scans come, but " + state.missing};
