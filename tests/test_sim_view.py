@@ -76,7 +76,10 @@ class Rig:
         self.simulator = Simulator(world, options)
         self.simulator.reset(1)
         self.fans = FleetFans(self.simulator)
-        self.topics = ViewTopics(10.0, "map", lambda: self.simulator.machinery, self.fans, lambda: {0: "/cmd_vel"})
+        drives = {0: "/cmd_vel"}
+        self.topics = ViewTopics(
+            10.0, "map", lambda: self.simulator.machinery, self.fans, lambda: drives, lambda: self.simulator.seed
+        )
         self.number = 0
 
     def _publisher(self, name, *_, **__):
