@@ -132,7 +132,7 @@ def test_nothing_is_believed_before_tf_says_so(maps):
 def test_who_localises_is_in_the_map_of_the_world(topics, maps):
     topics.tf("map", "odom", 1.0, 2.0, math.pi / 2)
     topics.tf("odom", "base_link", 3.0, 0.0, 0.5)
-    topics.publish("amcl_pose", belief({0: 0.04, 1: 0.01, 7: 0.09, 35: 0.02}))
+    topics.publish("amcl_pose", belief({0: 0.04, 1: 0.01, 6: 0.01, 7: 0.09, 35: 0.02}))
     cloud = [(0.5, -1.0, 3.0), (2.0, 1.0, -2.0)]
     topics.publish("particlecloud", PoseArray(poses=[Pose(Point(x, y, 0.0), turned(yaw)) for x, y, yaw in cloud]))
     estimate = maps.what.estimate(np.array([9.0, 9.0, 9.0]))

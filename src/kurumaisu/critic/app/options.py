@@ -34,7 +34,8 @@ examples:
                                          on a Dask cluster that is there
 
 other commands, each with its own --help: critic look, critic experiment,
-critic plan, critic rehearse, critic watch. A recording of such a name is ./watch
+critic plan, critic rehearse, critic watch. A recording of such a name is
+./watch
 
 exit codes:
   0    none: no effect is both detectable and large enough to matter
