@@ -30,7 +30,9 @@ MappingVerdict passing(const MappingState& state) {
 
 MappingVerdict judge(const MappingState& state) {
   // A node that is behind its scans is behind the clock, too.
-  if (!state.clock_problem.empty() && state.skipped == 0) return {2, "MAPPING_NO_CLOCK: " + state.clock_problem};
+  if (!state.clock_problem.empty() && state.skipped == 0) {
+    return {2, "MAPPING_NO_CLOCK: " + state.clock_problem};
+  }
   if (!state.start_problem.empty()) return {2, "MAPPING_START: " + state.start_problem};
   if (state.silence > state.silence_limit) return {2, "MAPPING_NO_SCAN: no scan came lately"};
   if (state.paused) return {1, "MAPPING_PAUSED: scans are not used"};
