@@ -17,7 +17,7 @@ from recordings import full_run, write_bag
 from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import CompressionMode
 
-from kurumaisu.critic.bags import limits, ros2
+from kurumaisu.critic.bags import limits
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error, told
@@ -199,8 +199,8 @@ def test_a_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch, name, how):
 
 def test_a_file_of_a_ros2_bag_is_unpacked_to_a_limit(tmp_path, monkeypatch):
     write_bag(tmp_path / "a", full_run(), ros=2, compression=CompressionMode.FILE)
-    monkeypatch.setattr(ros2, "LEAST_UNPACKED", 100)
-    monkeypatch.setattr(ros2, "TIMES_UNPACKED", 1)
+    monkeypatch.setattr(limits, "LEAST_UNPACKED", 100)
+    monkeypatch.setattr(limits, "TIMES_UNPACKED", 1)
     assert "a.db3.zstd: has more than" in refusal(tmp_path)
 
 

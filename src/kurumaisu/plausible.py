@@ -6,6 +6,8 @@ A finite number may still make no sense: 1e300 m is finite, and its square is no
 
 from __future__ import annotations
 
+import math
+
 from kurumaisu import _core
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
@@ -32,6 +34,14 @@ def yaw_of(x: float, y: float, z: float, w: float) -> float:
         return _core.yaw_of(x, y, z, w)
     except ValueError as error:
         raise Error(str(error)) from error
+
+
+def yaw_or_nan(x: float, y: float, z: float, w: float) -> float:
+    """Return what yaw_of does, or nan for a quaternion that has none."""
+    try:
+        return yaw_of(x, y, z, w)
+    except Error:
+        return math.nan
 
 
 def require_covariance(covariance: FloatArray) -> None:

@@ -14,6 +14,7 @@ from kurumaisu import program
 from kurumaisu.critic.app.display import cells, printable
 from kurumaisu.critic.app.options import name_list
 from kurumaisu.critic.bags.containers import is_bag
+from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
 from kurumaisu.critic.bags.topics import read_topics
@@ -22,6 +23,7 @@ from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
+from kurumaisu.critic.data.wheel_reader import JOINTS
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error, failed
 from kurumaisu.types import FloatArray
@@ -32,7 +34,6 @@ rates, gaps, clocks; what meta.yaml could map; and what is missing for which
 verdict. Nothing is fitted, and nothing written."""
 _FASTER = 5.0  # times the usual interval is a gap
 _ENOUGH = 60.0  # [s] of motion, below which small effects stay hidden
-_JOINTS = "sensor_msgs/JointState"
 _IMU = "sensor_msgs/Imu"
 
 
@@ -92,11 +93,11 @@ def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
     inputs = [run for run in runs if run.command or run.voltage]
     posed = [run for run in inputs if run.pose or run.odom]
     if posed:
-        source = "measured poses" if all(run.pose for run in posed) else "odometry: what the wheels do on the floor"
-        yield f"base: {_moving(posed):.0f} s of motion, against {source}" + (
-            " does not show" if source.startswith("odom") else ""
-        )
-        if _moving(posed) < _ENOUGH:
+        moving = _moving(posed)
+        measured = all(run.pose for run in posed)
+        source = "measured poses" if measured else "odometry: what the wheels do on the floor does not show"
+        yield f"base: {moving:.0f} s of motion, against {source}"
+        if moving < _ENOUGH:
             yield f"  small effects may stay hidden: {_ENOUGH:.0f} s of motion, both ways and both turns, show most"
     elif any(run.odom and run.pose for run in runs):
         yield "base: of odometry alone, against poses, over 2 s at a time; commands or voltages would show lags, too"
@@ -154,7 +155,7 @@ def _topics(source: Path, meta: Meta) -> Iterator[str]:
 
 
 def _note(kind: str) -> str:
-    if kind == _JOINTS:
+    if kind == shown(JOINTS):
         return "could be wheels"
     return "not used" if kind == _IMU else ""
 

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from kurumaisu import program
 from kurumaisu.critic.data import excerpt
 from kurumaisu.critic.values.version import version
 from kurumaisu.errors import Error
 
+_Read = TypeVar("_Read")
 _DESCRIPTION = """\
 Say what a model gets wrong about a measured robot: replay the recording through
 the model, name what is missing, or abstain. Writes verdict.json, extended.yaml
@@ -66,14 +68,20 @@ def _parser() -> argparse.ArgumentParser:
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     since = "12.5 as in tables and messages, or +12.5 since each drive began"
-    add("--from", dest="start", type=_moment, metavar="T", help=f"use drives from this time on [s]: {since}")
-    add("--to", dest="stop", type=_moment, metavar="T", help="use drives until this time [s]")
+    add(
+        "--from",
+        dest="start",
+        type=_argument(excerpt.moment),
+        metavar="T",
+        help=f"use drives from this time on [s]: {since}",
+    )
+    add("--to", dest="stop", type=_argument(excerpt.moment), metavar="T", help="use drives until this time [s]")
     rows = (
         "leave out rows of a part (pose, odom, scan, command, voltage), or of all that was measured, between two times"
     )
     add(
         "--without-rows",
-        type=_gap,
+        type=_argument(excerpt.gap),
         action="append",
         default=[],
         metavar="[PART:]T..T",
@@ -109,18 +117,16 @@ def name_list(text: str) -> tuple[str, ...]:
     return parts
 
 
-def _moment(text: str) -> excerpt.Moment:
-    try:
-        return excerpt.moment(text)
-    except Error as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+def _argument(read: Callable[[str], _Read]) -> Callable[[str], _Read]:
+    """Return a reader of words whose Error is one of the command line."""
 
+    def argument(text: str) -> _Read:
+        try:
+            return read(text)
+        except Error as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
 
-def _gap(text: str) -> excerpt.Gap:
-    try:
-        return excerpt.gap(text)
-    except Error as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+    return argument
 
 
 def whole_number(text: str) -> int:

@@ -15,11 +15,14 @@ from kurumaisu.errors import Error
 MOST_UNPACKED = 2**28  # [bytes] of a chunk; recorders' have 1 to 4 MB and at most one message more
 LEAST_UNPACKED = 2**26  # [bytes] of a whole file, and
 TIMES_UNPACKED = 200  # times its size: scans are packed 2 to 20 times
+_WINDOW = 2**27  # [bytes] that zstd may look back
+_PIECE = 2**20  # [bytes] unpacked at a time of a whole file
+LATEST = 2**63 - 1  # [ns] a time that no message is after
 
 
 def _zstd(data: bytes, most: int) -> bytes:
     """Unpack frame by frame: the size that a frame states need not be true, nor small."""
-    with zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data, read_across_frames=True) as stream:
+    with zstandard.ZstdDecompressor(max_window_size=_WINDOW).stream_reader(data, read_across_frames=True) as stream:
         return stream.read(most)
 
 
@@ -37,14 +40,29 @@ class Unpacker:
     def __init__(self, path: Path, size: int) -> None:
         self._path = path
         self._sizes: dict[int, int] = {}  # [bytes] of pieces, unpacked, by their places
-        self._most = LEAST_UNPACKED + TIMES_UNPACKED * size  # [bytes] of all of them
+        self._total, self._packed = 0, size  # [bytes] of all of them, and of the file
 
     def unpack(self, kind: str, data: bytes, place: int) -> bytes:
         """Return a piece unpacked; place: tells the pieces apart, for one may be read again."""
         unpacked = UNPACKERS[kind](data, MOST_UNPACKED + 1)
+        self._total += len(unpacked) - self._sizes.get(place, 0)
         self._sizes[place] = len(unpacked)
         if len(unpacked) > MOST_UNPACKED:
             raise Error(f"{self._path}: a chunk has more than {MOST_UNPACKED} bytes unpacked")
-        if sum(self._sizes.values()) > self._most:
-            raise Error(f"{self._path}: has more than {self._most} bytes unpacked: {TIMES_UNPACKED} times its size")
+        _check(self._path, self._packed, self._total)
         return unpacked
+
+
+def check_packed(path: Path) -> None:
+    """Raise Error for a file packed as a whole that has too much in it."""
+    size = 0
+    with path.open("rb") as packed, zstandard.ZstdDecompressor(max_window_size=_WINDOW).stream_reader(packed) as stream:
+        while piece := stream.read(_PIECE):
+            size += len(piece)
+            _check(path, path.stat().st_size, size)
+
+
+def _check(path: Path, packed: int, unpacked: int) -> None:
+    most = LEAST_UNPACKED + TIMES_UNPACKED * packed
+    if unpacked > most:
+        raise Error(f"{path}: has more than {most} bytes unpacked: {TIMES_UNPACKED} times its size")

@@ -23,7 +23,7 @@ from rosbags.interfaces import (
 from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
 from rosbags.typesys.msg import normalize_msgtype
 
-from kurumaisu.critic.bags.limits import MOST_UNPACKED, UNPACKERS, Unpacker
+from kurumaisu.critic.bags.limits import LATEST, MOST_UNPACKED, UNPACKERS, Unpacker
 from kurumaisu.errors import Error, told
 
 _FORMATS = {
@@ -33,7 +33,6 @@ _FORMATS = {
     "omgidl": MessageDefinitionFormat.IDL,
 }
 _ROS1, _ROS2 = "ros1", "cdr"
-_LATEST = 2**63 - 1
 
 
 class McapFile:
@@ -42,7 +41,7 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.connections: list[Connection] = []
-        self.start_time, self.end_time = _LATEST, 0  # [ns] of the first message, and just after the last
+        self.start_time, self.end_time = LATEST, 0  # [ns] of the first message, and just after the last
         self._unpacker = Unpacker(path, path.stat().st_size)
 
     @property
@@ -91,7 +90,7 @@ class McapFile:
     ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, time of logging [ns] and data, in the order of the file, from start until before stop."""
         wanted = {connection.id: connection for connection in connections}
-        first, last = start or 0, _LATEST if stop is None else stop
+        first, last = start or 0, LATEST if stop is None else stop
         for record in self._records():
             if isinstance(record, Message) and record.channel_id in wanted and first <= record.log_time < last:
                 yield wanted[record.channel_id], record.log_time, record.data

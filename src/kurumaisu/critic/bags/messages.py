@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kurumaisu.critic.values.recording import Fan
-from kurumaisu.errors import Error
-from kurumaisu.plausible import yaw_of
+from kurumaisu.plausible import yaw_or_nan
 
 # Parts of a run that have a type of their own; any other topic is a covariate.
 PARTS = ("command", "voltage", "pose", "odom", "scan")
@@ -85,11 +84,7 @@ def _fix(message: Any) -> tuple[float, ...]:
 
 
 def _yaw(q: Any) -> float:
-    """Return the rotation about z [rad], nan for a quaternion that has none."""
-    try:
-        return yaw_of(q.x, q.y, q.z, q.w)
-    except Error:
-        return math.nan
+    return yaw_or_nan(q.x, q.y, q.z, q.w)
 
 
 def _scan(message: Any) -> ScanRow:

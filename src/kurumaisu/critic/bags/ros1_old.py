@@ -12,6 +12,8 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag1, MessageDefiniti
 from rosbags.rosbag1.reader import Header, normalize, read_bytes, read_uint32
 from rosbags.typesys.msg import normalize_msgtype
 
+from kurumaisu.critic.bags.limits import LATEST
+
 MAGIC = b"#ROSBAG V1.2\n"
 _DEFINITION, _MESSAGE = 1, 2  # kinds of records
 
@@ -22,7 +24,7 @@ class OldRos1Bag:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.connections: list[Connection] = []
-        self.start_time, self.end_time = 2**63 - 1, 0  # [ns] of the first message, and just after the last
+        self.start_time, self.end_time = LATEST, 0  # [ns] of the first message, and just after the last
 
     def __enter__(self) -> OldRos1Bag:
         """Find the topics."""
@@ -54,7 +56,7 @@ class OldRos1Bag:
     ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, time of receipt [ns] and data, in the order of the file, from start until before stop."""
         wanted = {connection.topic: connection for connection in connections}
-        first, last = start or 0, 2**63 - 1 if stop is None else stop
+        first, last = start or 0, LATEST if stop is None else stop
         for header, data in self._records(messages=True):
             topic = normalize(header.get_string("topic"))
             if header.get_uint8("op") == _MESSAGE and topic in wanted and first <= _received(header) < last:

@@ -8,23 +8,44 @@ from collections.abc import Collection, Generator
 from pathlib import Path
 from typing import Any
 
-import zstandard
 from rosbags.interfaces import Connection
 from rosbags.rosbag2.reader import DirectoryReader
 from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 
 from kurumaisu import settings
 from kurumaisu.bounded_files import MOST_RECORDING, check_file
-from kurumaisu.critic.bags.limits import LEAST_UNPACKED, TIMES_UNPACKED, Unpacker
+from kurumaisu.critic.bags.limits import Unpacker, check_packed
 from kurumaisu.critic.bags.mcap_file import McapFile
 from kurumaisu.errors import Error
 
 METADATA = "metadata.yaml"
 _HEAD = struct.Struct(">16xH10xI")  # of an SQLite file: bytes of a page, 1 for 65536, and how many pages
-_PIECE = 2**20  # [bytes] unpacked at a time
 
 
-class Database(Sqlite3Reader):
+class _Context:
+    """Makes a reader of rosbags a context that says when its messages came."""
+
+    def __enter__(self: Any) -> Any:
+        """Open."""
+        self.open()
+        return self
+
+    def __exit__(self: Any, *_: object) -> None:
+        """Close."""
+        self.close()
+
+    @property
+    def start_time(self: Any) -> int:
+        """Time of the first message [ns]."""
+        return int(self.metadata.start_time)
+
+    @property
+    def end_time(self: Any) -> int:
+        """Time just after the last message [ns]."""
+        return int(self.metadata.end_time)
+
+
+class Database(_Context, Sqlite3Reader):
     """One .db3 file."""
 
     path: Path
@@ -40,27 +61,8 @@ class Database(Sqlite3Reader):
         _check_whole(self.path)
         super().open()
 
-    def __enter__(self) -> Database:
-        """Open."""
-        self.open()
-        return self
 
-    def __exit__(self, *_: object) -> None:
-        """Close."""
-        self.close()
-
-    @property
-    def start_time(self) -> int:
-        """Time of the first message [ns]."""
-        return self.metadata.start_time
-
-    @property
-    def end_time(self) -> int:
-        """Time just after the last message [ns]."""
-        return self.metadata.end_time
-
-
-class Ros2Bag(DirectoryReader):
+class Ros2Bag(_Context, DirectoryReader):
     """A folder with metadata.yaml, which names its files."""
 
     path: Path
@@ -77,30 +79,11 @@ class Ros2Bag(DirectoryReader):
         for file, mode in _files(self.path):
             check_file(file, MOST_RECORDING)
             if mode == "file":
-                _check_unpacked(file)
+                check_packed(file)
         super().open()
         # Unpacked here, to a limit, rather than there without one.
         self._messages_are_packed = self.metadata.compression_mode == "message"
         self.metadata = self.metadata._replace(compression_mode=None)
-
-    def __enter__(self) -> Ros2Bag:
-        """Open."""
-        self.open()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Close."""
-        self.close()
-
-    @property
-    def start_time(self) -> int:
-        """Time of the first message [ns]."""
-        return self.metadata.start_time
-
-    @property
-    def end_time(self) -> int:
-        """Time just after the last message [ns]."""
-        return self.metadata.end_time
 
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
@@ -130,13 +113,3 @@ def _files(path: Path) -> list[tuple[Path, str]]:
         raise top.error("relative_file_paths", "must be a list of files")
     mode = str(top.take("compression_mode")).lower() if "compression_mode" in top else ""
     return [(path / Path(name).name, mode) for name in names]
-
-
-def _check_unpacked(file: Path) -> None:
-    most = LEAST_UNPACKED + TIMES_UNPACKED * file.stat().st_size
-    size = 0
-    with file.open("rb") as packed, zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(packed) as stream:
-        while piece := stream.read(_PIECE):
-            size += len(piece)
-            if size > most:
-                raise Error(f"{file}: has more than {most} bytes unpacked: {TIMES_UNPACKED} times its size")

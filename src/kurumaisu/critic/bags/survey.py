@@ -11,6 +11,7 @@ from pathlib import Path
 from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import opened
 from kurumaisu.critic.bags.decoding import shown
+from kurumaisu.critic.bags.limits import LATEST
 from kurumaisu.critic.bags.parts import parts_of
 from kurumaisu.critic.bags.topics import Reading, absolute
 
@@ -60,7 +61,7 @@ class Found:
 def survey(path: Path) -> list[Found]:
     """Return the topics of a bag, or of all parts of one that was split, by name. Raise Error naming a broken file."""
     counts: dict[tuple[str, str], int] = {}
-    start, end = 2**63 - 1, 0
+    start, end = LATEST, 0
     for bag in parts_of(path):
         with Reading(bag), opened(bag) as opened_bag:
             for connection in opened_bag.connections:

@@ -93,7 +93,7 @@ def read_topics(path: Path, wanted: Wanted) -> dict[str, Topic]:
         try:
             row = converters[name, kind](message)
             if row is not None:
-                topic.add(received, _stamp(message), row)
+                topic.add(received, stamp_of(message), row)
         except AttributeError as error:
             raise Error(f"{where}: {shown(kind)} has another definition here: {error}") from error
         except Error as error:
@@ -148,6 +148,7 @@ def _decoded(path: Path, connection: Connection, decode: Callable[[bytes], Any],
         raise Error(f"{broken(path)}: {connection.topic}: a message cannot be read: {told}") from error
 
 
-def _stamp(message: Any) -> int:
+def stamp_of(message: Any) -> int:
+    """Return the stamp of a message [ns], 0 where it has none."""
     header = getattr(message, "header", None)
     return 0 if header is None else int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)

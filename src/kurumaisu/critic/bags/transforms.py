@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu.critic.bags.topics import read_messages
+from kurumaisu.critic.bags.topics import read_messages, stamp_of
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 from kurumaisu.types import FloatArray
@@ -105,8 +105,7 @@ def _of(item: Any) -> tuple[str, str]:
 
 def _row(item: Any) -> tuple[int, tuple[float, ...]]:
     place, turn = item.transform.translation, item.transform.rotation
-    stamp = int(item.header.stamp.sec) * 1_000_000_000 + int(item.header.stamp.nanosec)
-    return stamp, (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+    return stamp_of(item), (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
 
 
 def _matrices(rows: FloatArray) -> FloatArray:

@@ -10,13 +10,13 @@ import numpy as np
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
 
 _SHORTEST = 0.05  # [m] least way whose direction is looked at, and
 _NOISES = 40.0  # times the noise of a position: a heading is known to 2 degrees then
 _LONGEST = 10.0  # [s] that a way may take
 _LARGEST_TURN = 1.0  # [rad] within a way: the chord of an arc of even curvature points as its middle does
-_TO_SD = 1.4826  # from the median of absolute values of what is Gaussian
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def _noise(places: FloatArray) -> float:
     if len(places) < 3:
         return 0.0
     off = places[1:-1] - (places[:-2] + places[2:]) / 2
-    return float(_TO_SD * np.median(np.abs(off - np.median(off, axis=0))) / np.sqrt(1.5))
+    return float(SIGMA_PER_MAD * np.median(np.abs(off - np.median(off, axis=0))) / np.sqrt(1.5))
 
 
 def _course(step: FloatArray, ahead: float) -> float:

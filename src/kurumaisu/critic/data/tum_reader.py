@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.errors import Error, told
+from kurumaisu.plausible import yaw_or_nan
 from kurumaisu.types import FloatArray
 
 SUFFIX = ".tum"
@@ -26,10 +26,9 @@ def read_tum(path: Path) -> tuple[FloatArray, FloatArray]:
         cells = line.split("#")[0].split()
         if cells:
             rows.append(_row(f"{path}:{number}", cells))
-    t, x, y, _, qx, qy, qz, qw = np.array(rows, dtype=np.float64).reshape(-1, _NUMBERS).T
-    sine, cosine = 2 * (qw * qz + qx * qy), qw * qw + qx * qx - qy * qy - qz * qz
-    theta = np.where(np.hypot(sine, cosine) > 0, np.arctan2(sine, cosine), math.nan)
-    return t, np.stack([x, y, theta], axis=1)
+    table = np.array(rows, dtype=np.float64).reshape(-1, _NUMBERS)
+    theta = [yaw_or_nan(*row[4:]) for row in table.tolist()]
+    return table[:, 0], np.column_stack([table[:, 1:3], theta])
 
 
 def _row(where: str, cells: list[str]) -> list[float]:

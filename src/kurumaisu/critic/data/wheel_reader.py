@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.topics import Topic, absolute, read_topics
 from kurumaisu.critic.data.odometry import Wheels, along, driven_by, rates_between
 from kurumaisu.errors import Error
@@ -47,7 +48,7 @@ def _joints(path: Path, wheels: Wheels) -> tuple[FloatArray, FloatArray, FloatAr
 
     def converter(kind: str) -> Any:
         if kind != JOINTS:
-            raise Error(f"is of type {kind.replace('/msg/', '/')}, not of sensor_msgs/JointState")
+            raise Error(f"is of type {shown(kind)}, not of {shown(JOINTS)}")
         return convert
 
     found = read_topics(path, {topic: converter})
