@@ -50,7 +50,7 @@ class ClosedLoop(unittest.TestCase):
         start = self.rest().header.stamp.to_sec()
         self.commander.say(v, w)
         self.truth.wait(lambda m: m.header.stamp.to_sec() > start + seconds, "time to pass")
-        self.commander.silence()
+        self.commander.say(0.0, 0.0)
         end = self.rest().header.stamp.to_sec()
         wait_for(lambda: self.odom.last.header.stamp.to_sec() > end, "odometry of the end")
         return tuple(geometry.between(at(topic, start), at(topic, end)) for topic in (self.odom, self.truth))
