@@ -57,6 +57,7 @@ class Check:
     alone: bool = False  # not beside other rostests
     after: str = ""  # name of a check that it waits for, if that is chosen, too
     tests: bool = False  # writes its results to a folder of its name
+    clock: bool = False  # waits for processes by the wall's clock: what fails on a busy machine gets a second try
 
     def only(self, word: str) -> Check:
         """Return what is left of it where only names with this word are asked for."""
@@ -185,6 +186,7 @@ def _rostests(tree: Inputs) -> list[Check]:
             partial(tree.of_rostest, path),
             alone=path.stem in ALONE,
             quick=False,
+            clock=True,
         )
         for path in paths
     ]
@@ -197,7 +199,7 @@ def _gtests(tree: Inputs) -> list[Check]:
         if name.startswith("gtest_"):
             program = Path(re.findall(r"(\S+) --gtest_output", " ".join(command))[0])
             state = partial(tree.of_program, program)
-            checks.append(_ctest(name.replace("_", " ", 1), command, state, after=BUILD_TESTS))
+            checks.append(_ctest(name.replace("_", " ", 1), command, state, after=BUILD_TESTS, clock=True))
     return checks
 
 
@@ -216,7 +218,7 @@ def _pytests(tree: Inputs, quick: bool) -> list[Check]:
         return Check(name, command, parts, tests=True, **more)
 
     sums = check("pytest sums", (path for path in paths if path not in wait), after=BUILD_TESTS, beside=not quick)
-    return [sums, check("pytest", wait, after=BUILD_TESTS, quick=False)]
+    return [sums, check("pytest", wait, after=BUILD_TESTS, quick=False, clock=True)]
 
 
 def _run(check: Check, stop: Event) -> Counts:
@@ -227,28 +229,36 @@ def _run(check: Check, stop: Event) -> Counts:
     if not stale:
         _line("ok", check.name, 0.0, 0.0, f"{total if check.tests else 'nothing changed'} (as before)")
         return total
+    now = _attempt(check, stale, states, stop, f"({len(before)} of {len(check.parts)} files as before)" if before else "")
+    failed = [part for part in stale if now[part].failed]
+    if check.clock and failed and not stop.is_set():
+        now |= _attempt(check, failed, states, stop, "(second try)")
+    return sum(now.values(), total)
+
+
+def _attempt(check: Check, parts: list[Part], states: dict[Part, str], stop: Event, remark: str) -> dict[Part, Counts]:
+    """Run some parts of a check, say how that went, and keep what passed."""
     folder, log = _folder(check.name), LOGS / f"{check.name}.log"
     if check.tests:
         shutil.rmtree(folder, ignore_errors=True)
-    files = [str(part.path) for part in stale if part.path]
+    files = [str(part.path) for part in parts if part.path]
     ended = running.run([*check.command, *files], log, check.timeout, stop, check.beside)
     xunit = sorted(folder.rglob("*.xml")) if check.tests else []
-    now = _counts(check, stale, xunit, ended.problem)
-    for part in stale:
+    now = _counts(check, parts, xunit, ended.problem)
+    for part in parts:
         if not now[part].failed and ended.problem in ("", TESTS_FAILED):  # else some of them may not have run
             took = results.seconds(xunit, part.name) if part.path else ended.wall
             passed.keep(part, states[part], now[part], took)
     ran = sum(now.values(), Counts())
     note = ended.problem or (str(ran) if check.tests else "")
-    note += f" ({len(before)} of {len(check.parts)} files as before)" if before else ""
-    _line("FAILED" if ran.failed else "ok", check.name, ended.wall, ended.cpu, note)
+    _line("FAILED" if ran.failed else "ok", check.name, ended.wall, ended.cpu, f"{note} {remark}")
     if ran.failed:
         said = [line for line in log.read_text(errors="replace").splitlines() if not line.endswith("[passed]")]
-        silent = [f"no test ran in {part.name}" for part in stale if part.path and not results.of(xunit, part.name)]
+        silent = [f"no test ran in {part.name}" for part in parts if part.path and not results.of(xunit, part.name)]
         # what failed comes first: who reads this may see the beginning only
         lines = [f"    {line}" for line in [*results.failures(xunit), *silent, *said[-TAIL:]]]
         print("\n".join(lines), f"\n    (whole output: {log})", flush=True)
-    return total + ran
+    return now
 
 
 def _counts(check: Check, parts: list[Part], xunit: list[Path], problem: str) -> dict[Part, Counts]:

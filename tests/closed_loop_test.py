@@ -58,14 +58,14 @@ class ClosedLoop(unittest.TestCase):
     def test_odometry_is_what_the_chair_does(self):
         """Without effects the plant inverts the voltages exactly: only the step of the simulator is between them."""
         for v, w in ((0.4, 0.0), (0.0, 0.1), (0.0, -0.1), (-0.3, 0.0), (0.3, -0.5)):
-            with self.subTest(v=v, w=w):
-                odometry, truth = self.drive(v, w, 1.5)
-                step = 0.03  # [s] a command begins and ends between the steps of both nodes
-                np.testing.assert_allclose(odometry, truth, atol=2 * step * max(abs(v), abs(w)) + 1e-3)
-                expected = v if w == 0 else w
-                moved = truth[0] if w == 0 else truth[2]
-                assert np.sign(moved) == np.sign(expected)
-                assert abs(moved) > abs(expected)
+            odometry, truth = self.drive(v, w, 1.5)
+            step = 0.03  # [s] a command begins and ends between the steps of both nodes
+            atol = 2 * step * max(abs(v), abs(w)) + 1e-3
+            np.testing.assert_allclose(odometry, truth, atol=atol, err_msg=f"{v=}, {w=}")
+            expected = v if w == 0 else w
+            moved = truth[0] if w == 0 else truth[2]
+            assert np.sign(moved) == np.sign(expected)
+            assert abs(moved) > abs(expected), f"{v=}, {w=}: {truth}"
 
     def test_silence_is_neutral(self):
         self.commander.say(0.4, 0.3)
