@@ -229,7 +229,8 @@ def _run(check: Check, stop: Event) -> Counts:
     if not stale:
         _line("ok", check.name, 0.0, 0.0, f"{total if check.tests else 'nothing changed'} (as before)")
         return total
-    now = _attempt(check, stale, states, stop, f"({len(before)} of {len(check.parts)} files as before)" if before else "")
+    as_before = f"({len(before)} of {len(check.parts)} files as before)" if before else ""
+    now = _attempt(check, stale, states, stop, as_before)
     failed = [part for part in stale if now[part].failed]
     if check.clock and failed and not stop.is_set():
         now |= _attempt(check, failed, states, stop, "(second try)")
