@@ -82,6 +82,7 @@ class PageRig(Rig):
         self.acting = {}
         self.robots = robots
         self.contacts = {}
+        self.added, self.gone, self._last = {}, set(), 90  # by ids; the last one's number
         self.rear = None  # [m] that a second ranger of the chair, which looks back, sees everywhere
         self.playback = PlaybackState(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
         super().__init__(hub, **others)
@@ -106,6 +107,47 @@ class PageRig(Rig):
     def asked(self, name):
         """Return the arguments of every command of a name so far."""
         return [arguments for one, arguments in list(self.commands) if one == name]
+
+    def do_add(self, kind, x, y, yaw, length, width, **_to):
+        if x > HALF:
+            raise Error(f"{kind} 1: would stand in a wall")
+        self._last += 1
+        a, b = length / 2, width / 2
+        body = Body(
+            f"#{self._last}",
+            f"{kind} {self._last}",
+            "obstacle",
+            "#8b7355",
+            True,
+            (((a, b), (-a, b), (-a, -b), (a, -b)),),
+        )
+        self.added[body.id] = body
+        self.poses[body.id] = (x, y, yaw)
+        self.show_world()
+        return Outcome(f"{body.name} was added", body.id)
+
+    def do_delete(self, body):
+        self.gone.add(body)
+        self.show_world()
+        return Outcome("deleted")
+
+    def do_restore(self, body):
+        if body not in self.gone:
+            raise Error(f"model {body}: was not deleted")
+        self.gone.remove(body)
+        self.show_world()
+        return Outcome("it is back")
+
+    def do_reset(self):
+        self.added, self.gone, self._last = {}, set(), 90
+        self.show_world()
+        return super().do_reset()
+
+    def show_world(self):
+        """Put what there is now into the hub."""
+        known = crowd(self.robots)
+        bodies = [body for body in (*known.bodies, *self.added.values()) if body.id not in self.gone]
+        self.hub.world(replace(known, bodies=tuple(bodies)))
 
     def do_seek(self, t):
         self.playback = replace(self.playback, t=t)

@@ -76,6 +76,9 @@ COMMANDS: Mapping[str, _Kinds] = {
     "reset": {},
     "seed": {"value": _seed},
     "set_pose": {"body": _word, "x": _number, "y": _number, "yaw": _number},
+    "add": {"kind": _word, "x": _number, "y": _number, "yaw": _number, "length": _number, "width": _number},
+    "delete": {"body": _word},
+    "restore": {"body": _word},
     "drive": {"v": _number, "w": _number},  # and of several robots, which one
     "estop": {"on": _flag},
     "effect": {"effect": _word, "enabled": _flag, "values": _values},
@@ -87,7 +90,10 @@ COMMANDS: Mapping[str, _Kinds] = {
     "run": {"run": _word},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
-_OPTIONAL: Mapping[str, _Kinds] = {"drive": {"body": _word}}
+_OPTIONAL: Mapping[str, _Kinds] = {
+    "drive": {"body": _word},
+    "add": {"to_x": _number, "to_y": _number},  # where a person walks to, and back
+}
 
 
 def read(message: str) -> Request | Credential:
