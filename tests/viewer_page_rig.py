@@ -17,7 +17,7 @@ from viewer_rig import BEAMS, CHAIR, HALF, Rig, room_ranges, viewer_settings, wo
 
 from kurumaisu import effects
 from kurumaisu.errors import Error
-from kurumaisu.viewer import Body, Fan, Group, Hub, Note, Outcome, PlaybackState, Server, Value, World
+from kurumaisu.viewer import Body, Fan, Goal, Group, Hub, Note, Outcome, PlaybackState, Server, Value, World
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 BAG = frozenset({"seek", "play", "rate"})
@@ -82,6 +82,7 @@ class PageRig(Rig):
         self.acting = {}
         self.robots = robots
         self.contacts = {}
+        self.goal = None
         self.added, self.gone, self._last = {}, set(), 90  # by ids; the last one's number
         self.rear = None  # [m] that a second ranger of the chair, which looks back, sees everywhere
         self.playback = PlaybackState(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
@@ -138,6 +139,18 @@ class PageRig(Rig):
         self.show_world()
         return Outcome("it is back")
 
+    def do_goal(self, x, y, yaw):
+        self.goal = Goal((x, y, yaw))
+        return Outcome("published on /move_base_simple/goal, no nodes listening")
+
+    def do_go(self, body=None):
+        self.goal = replace(self.goal, body=body or "1", driving=True, text="driving there")
+        return Outcome("driving there")
+
+    def do_forget_goal(self):
+        self.goal = None
+        return Outcome("no goal")
+
     def do_reset(self):
         self.added, self.gone, self._last = {}, set(), 90
         self.show_world()
@@ -163,7 +176,11 @@ class PageRig(Rig):
     def dressed(self, state):
         """Return the moment with a playback and a note that wants to be HTML."""
         return replace(
-            state, playback=self.playback, contacts=dict(self.contacts), notes=(Note("warning", f"MADE_UP {HOSTILE}"),)
+            state,
+            goal=self.goal,
+            playback=self.playback,
+            contacts=dict(self.contacts),
+            notes=(Note("warning", f"MADE_UP {HOSTILE}"),),
         )
 
     def more_scans(self):

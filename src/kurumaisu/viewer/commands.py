@@ -88,10 +88,14 @@ COMMANDS: Mapping[str, _Kinds] = {
     "play": {"on": _flag},
     "rate": {"value": _number},
     "run": {"run": _word},
+    "goal": {"x": _number, "y": _number, "yaw": _number},
+    "go": {},
+    "forget_goal": {},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
 _OPTIONAL: Mapping[str, _Kinds] = {
     "drive": {"body": _word},
+    "go": {"body": _word},
     "add": {"to_x": _number, "to_y": _number},  # where a person walks to, and back
 }
 

@@ -103,6 +103,16 @@ class Note:
 
 
 @dataclass(frozen=True)
+class Goal:
+    """Where a robot is to go; body: which one the viewer drove there, driving: and does; text: how that stands."""
+
+    pose: Pose
+    body: str | None = None
+    driving: bool = False
+    text: str = ""
+
+
+@dataclass(frozen=True)
 class PlaybackState:
     """Where a recording is: times [s] by the run's own clock, rate: recorded seconds per second; run: one of runs."""
 
@@ -147,6 +157,7 @@ class State:
     notes: tuple[Note, ...] = ()
     playback: PlaybackState | None = None
     driver: str | None = None  # the input that drives
+    goal: Goal | None = None
 
 
 @dataclass(frozen=True)

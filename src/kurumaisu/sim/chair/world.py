@@ -130,7 +130,7 @@ class ChairWorld:
         self._go_on_with(without(machinery, index).population)
 
     def restore_model(self, name: str, step: int) -> None:
-        """Bring back what was deleted. Raise Error, with nothing changed, if it cannot be or the chair is in the way."""
+        """Bring back what was deleted. Raise Error, with nothing changed, if it cannot be."""
         self._go_on_with(self.machinery.population.restored(name, step))
 
     def _go_on_with(self, population: Population) -> None:

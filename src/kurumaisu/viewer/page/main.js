@@ -12,6 +12,7 @@ import {byId} from "./common/dom.js";
 import {Edit} from "./picture/edit.js";
 import {Effects} from "./panels/effects.js";
 import {download} from "./common/download.js";
+import {GoalPanel} from "./panels/goal.js";
 import {History} from "./panels/history.js";
 import {keyTable, listen} from "./panels/keys.js";
 import {Options} from "./panels/options.js";
@@ -71,11 +72,15 @@ async function drawn(tool, from, to) {
   if (tool === "estimate") {
     options.set({tool: null});
     ask("initial_pose", {x: from[0], y: from[1], yaw: Math.atan2(dy, dx)});
+  } else if (tool === "goal") {
+    options.set({tool: null});
+    goals.set(from, [dx, dy]);
   } else {
     const id = await edits.add(added(tool, from, to));
     if (id !== null) options.set({selected: id});
   }
 }
+const goals = new GoalPanel(scene, picture, permit, ask, say, () => stick.drive.body);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),
   moved: (...move) => edits.moved(...move), drawn,

@@ -3,7 +3,7 @@
 
 import {News, byId, setPressed} from "../common/dom.js";
 
-const TOOLS = ["measure", "estimate", "box", "wall", "person"]; // as their buttons are called
+const TOOLS = ["measure", "estimate", "goal", "box", "wall", "person"]; // as their buttons are called
 
 /** News: "change". */
 export class Options extends News {

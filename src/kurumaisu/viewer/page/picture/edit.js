@@ -211,7 +211,7 @@ function measures({from, to, kind}) {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
   if (kind === "box") return `${short(Math.abs(dx))} m × ${short(Math.abs(dy))} m`;
   const angle = `${short((Math.atan2(dy, dx) * 180) / Math.PI)}°`;
-  return kind === "estimate" ? angle : `${short(Math.hypot(dx, dy))} m, ${angle}`;
+  return kind === "estimate" || kind === "goal" ? angle : `${short(Math.hypot(dx, dy))} m, ${angle}`;
 }
 
 function frame(context, x0, y0, x1, y1, colors) {

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""The viewer's page in a real browser, on the real simulator: what a person does with it, and what comes of it."""
+
+import math
+import re
+from dataclasses import dataclass
+
+import pytest
+from playwright.sync_api import expect
+from test_viewer_page_control import drag
+from viewer_page_rig import Visit, until
+
+from kurumaisu.bench import processes
+
+WORLD = """
+model ( name "room" size [8 8 1] boundary 1 noblocks 1 color "gray30" )
+model ( name "crate" pose [2 -2 0 0] size [0.6 0.6 0.8] color "tan" )
+position ( name "chair" pose [-2 0 0 0] )
+"""
+PATIENCE = 60_000  # [ms] of the wall's clock for what a busy machine simulates
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A page that commands sim_node, and the environment in which others find its master."""
+
+    visit: Visit
+    environment: dict
+
+    @property
+    def page(self):
+        return self.visit.page
+
+    def choose(self, name):
+        """Choose a body by its name; return where it is, x, y [m], yaw [deg]."""
+        select, pose = self.page.locator("#body-select"), self.page.locator("#body-pose")
+        if self.page.locator("#tab-body").get_attribute("aria-selected") == "false":
+            self.page.locator("#tab-body").click()
+        option = select.locator("option", has_text=f"{name} (")
+        expect(option).to_have_count(1, timeout=PATIENCE)
+        select.select_option(label=option.text_content())
+        expect(pose).to_have_text(re.compile("m,"), timeout=PATIENCE)
+        return [float(number) for number in re.findall(r"[-\d.]+", pose.text_content().replace("−", "-"))]
+
+    def bodies(self):
+        return {text.split(" (")[0] for text in self.page.locator("#body-select option").all_text_contents()}
+
+
+@pytest.fixture(scope="module")
+def simulator(browser, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("room")
+    world, log = folder / "room.world", folder / "log"
+    world.write_text(WORLD)
+    launch = ["roslaunch", "kurumaisu", "sim.launch", f"world:={world}", "viewer:=true", "viewer_port:=0"]
+    with processes.master() as environment, processes.running(launch, log, environment):
+        link = until(lambda: re.search(r"http://\S+#token=\S+", log.read_text()), "the page's address", 60.0)[0]
+        with Visit(browser, link) as visit:
+            expect(visit.page.locator("#box")).to_be_enabled()
+            yield Simulator(visit, environment)
+
+
+def test_obstacles_are_drawn_taken_back_and_brought_back(simulator, tmp_path):
+    page = simulator.page
+    page.locator("#box").click()
+    drag(simulator.visit, (-0.5, 2.0), (0.5, 3.0))
+    page.locator("#wall").click()
+    drag(simulator.visit, (-3.0, -2.0), (-0.2, -2.0))
+    page.locator("#person").click()
+    drag(simulator.visit, (2.0, 0.0), (2.0, 3.0))
+    assert simulator.choose("box 1") == pytest.approx([0.0, 2.5, 0.0], abs=0.03)
+    assert simulator.choose("wall 1") == pytest.approx([-1.6, -2.0, 0.0], abs=0.03)  # longer than 2 m, but added
+    until(lambda: simulator.choose("person 1")[1] > 0.5, "the person walks", 60.0)
+    page.screenshot(path=tmp_path / "added.png")
+    page.keyboard.press("Escape")
+    for _ in range(3):
+        page.locator("#undo").click()
+    until(lambda: simulator.bodies() == {"none", "crate", "chair"}, "all taken back", 60.0)
+    page.locator("#redo").click()
+    assert simulator.choose("box 1") == pytest.approx([0.0, 2.5, 0.0], abs=0.03)
+    page.locator("#wall").click()
+    drag(simulator.visit, (-2.0, -1.0), (-2.0, 1.0))
+    expect(page.locator("#alarm")).to_contain_text("wall 2: the chair is in the way")
+    page.keyboard.press("Escape")
+
+
+def test_a_goal_is_published_and_the_simulated_chair_drives_there(simulator, tmp_path):
+    page, heard = simulator.page, tmp_path / "goal"
+    echo = ["rostopic", "echo", "-n", "1", "/move_base_simple/goal"]
+    with processes.running(echo, heard, simulator.environment) as listener:
+        # "n nodes listening" says whether it is there yet
+        def told():
+            page.locator("#goal").click()
+            drag(simulator.visit, (0.5, 0.5), (0.5, 1.5))
+            expect(page.locator("#toast")).to_contain_text("published on /move_base_simple/goal")
+            return "1 node listening" in page.locator("#toast").text_content()
+
+        until(told, "somebody hears of the goal", 60.0)
+        listener.wait(60.0)
+    text = heard.read_text()
+    assert 'frame_id: "map"' in text
+    x, y, _z, _x, _y, z, w = (float(number) for number in re.findall(r" [xyzw]: (\S+)", text))
+    assert (x, y, 2 * math.atan2(z, w)) == pytest.approx((0.5, 0.5, math.pi / 2), abs=0.03)
+    page.locator("#go").click()
+    expect(page.locator("#goal-text")).to_have_text("chair: driving there")
+    page.screenshot(path=tmp_path / "driving.png")
+    expect(page.locator("#goal-text")).to_have_text("chair: arrived", timeout=PATIENCE)
+    assert simulator.choose("chair") == pytest.approx([0.5, 0.5, 90.0], abs=4.0)
+    assert math.dist(simulator.choose("chair")[:2], (0.5, 0.5)) < 0.2
+    page.locator("#forget-goal").click()
+    expect(page.locator("#goal-box")).to_be_hidden()
