@@ -103,6 +103,14 @@ def test_after_a_reset_all_can_be_done_again(visit, shown, by_this_page):
     until(lambda: rig.gone == {"#91"}, "and gone")
 
 
+def test_the_world_is_saved_as_a_file(visit):
+    with visit.page.expect_download() as download:
+        visit.page.locator("#save-world").click()
+    assert download.value.suggested_filename == "saved.world"
+    assert download.value.path().read_text() == "a world\n"
+    expect(visit.page.locator("#toast")).to_have_text("The world was saved as it is at 1.000 s: 3 models.")
+
+
 def test_turning_by_keys_is_one_step(visit, shown):
     page, rig = visit.page, shown.rig
     page.mouse.click(*visit.spot(*BOX))

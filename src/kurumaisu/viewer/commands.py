@@ -79,6 +79,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "add": {"kind": _word, "x": _number, "y": _number, "yaw": _number, "length": _number, "width": _number},
     "delete": {"body": _word},
     "restore": {"body": _word},
+    "save_world": {},
     "drive": {"v": _number, "w": _number},  # and of several robots, which one
     "estop": {"on": _flag},
     "effect": {"effect": _word, "enabled": _flag, "values": _values},

@@ -23,6 +23,7 @@ from kurumaisu.world.syntax import NO_MACROS, Entity, Property, parse
 from kurumaisu.world.tokens import Kind, SourceText, Token
 from kurumaisu.world.tree import Builder, global_poses
 from kurumaisu.world.values import Units, Values, units_of
+from kurumaisu.world.writing import Setting, world_words
 
 _RESOLUTION = 0.02  # [m], as in Stage
 _INTERVAL = 100.0  # [ms], as in Stage
@@ -48,7 +49,8 @@ class World:
     models: in depth-first file order; poses: (n, 4), their global start poses x, y, z [m], heading [rad];
     resolution: edge of Stage's cells [m]; interval: of a step [s]; quit_time [s], 0: never; speedup: of the clock,
     0 or less: as fast as possible; semantics: how the file wants to be simulated, stage or physical, an addition to
-    Stage's language; vocabulary: what more text can be read with.
+    Stage's language; vocabulary: what more text can be read with; setting: what a file of the same world
+    says first.
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
     that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
@@ -66,6 +68,7 @@ class World:
     speedup: float
     semantics: str
     vocabulary: Vocabulary
+    setting: Setting
     segments: FloatArray
     obstacles: FloatArray
     starts: tuple[Start, ...]
@@ -153,6 +156,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
         speedup=said.number("speedup", 1.0),
         semantics=_semantics(said),
         vocabulary=vocabulary,
+        setting=Setting(world_words(said.entity, path), vocabulary.image_extents),
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
         starts=tuple(Start(m.name or "chair", poses[m.index, PLANAR]) for m in starts),

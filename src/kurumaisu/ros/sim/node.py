@@ -30,6 +30,7 @@ from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.chair.holder import VoltageHolder
 from kurumaisu.sim.chair.simulator import ChairSimulator, Observation
 from kurumaisu.sim.robots.newcomers import newcomers
+from kurumaisu.sim.robots.saved_world import Scene
 from kurumaisu.types import FloatArray
 
 _HELP = """
@@ -53,6 +54,7 @@ services:
   set_pose            move a model
   spawn, delete       add a model, or take one away
   restore             bring back what was taken away
+  save_world          the world as it is now, as the text of a world file
   save, load          the whole state, to a file and back
 parameters:
   launch/sim_node.yaml, and the arguments of launch/sim.launch
@@ -173,6 +175,10 @@ class SimNode:
     def restore(self, name: str) -> None:
         """Bring back what was deleted. Raise Error if it cannot be."""
         self._simulator.restore(name)
+
+    def scene(self) -> Scene:
+        """Return what there is now."""
+        return Scene(self._settings.world.setting, self._simulator.models, self._simulator.model_poses)
 
     def save(self) -> bytes:
         """Return the state of all but the voltages that are yet to come."""

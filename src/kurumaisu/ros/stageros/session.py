@@ -25,6 +25,7 @@ from kurumaisu.ros.view.fans import FleetFans
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.motion.partition import is_robot
 from kurumaisu.sim.robots.newcomers import newcomers
+from kurumaisu.sim.robots.saved_world import Scene
 from kurumaisu.sim.robots.simulator import Simulator
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
@@ -42,7 +43,7 @@ class Session:
         self.paused = False
         settings = replace(settings, options=settings.options.of_world(world.semantics))
         self._settings = settings
-        self._vocabulary = world.vocabulary
+        self._vocabulary, self._setting = world.vocabulary, world.setting
         self._use_model_names = use_model_names
         self._seed = settings.seed
         self._simulator = Simulator(world, settings.options)
@@ -178,6 +179,10 @@ class Session:
         more = slice(len(names), None)
         keys = self._simulator.machinery.robot_keys.tolist()[more]
         self._take([*names, *self._names_of_more(self._simulator.robots[more], keys)])
+
+    def scene(self) -> Scene:
+        """Return what there is now."""
+        return Scene(self._setting, self._simulator.models, self._simulator.model_poses)
 
     def save(self) -> bytes:
         """Return the whole state, with the names that the robots have here."""

@@ -19,14 +19,14 @@ from kurumaisu.msg import View
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.viewer.calls import call, done
 from kurumaisu.ros.viewer.topics import Newest
-from kurumaisu.srv import Delete, Seed, SetPose, Spawn, Speed
+from kurumaisu.srv import Delete, SaveWorld, Seed, SetPose, Spawn, Speed
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.palette import Walk, described
 from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
 from kurumaisu.viewer.source import Outcome
 
-ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose", "add", "delete", "restore"})
+ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose", "add", "delete", "restore", "save_world"})
 
 
 class SimulationSource:
@@ -84,35 +84,44 @@ class SimulationSource:
 
     def command(self, name: str, arguments: dict[str, Any]) -> Outcome:
         """Obey. Raise Error with the reason where it cannot be."""
-        front = self._services
-        match name:
-            case "pause":
-                return Outcome(done(f"{front}pause", SetBool, arguments["on"]))
-            case "step":
-                return Outcome(done(f"{front}step", Trigger))
-            case "speed":
-                return Outcome(done(f"{front}speed", Speed, arguments["value"]))
-            case "seed":
-                return Outcome(done(f"{front}seed", Seed, arguments["value"]))
-            case "reset":
-                call(f"{front}reset", Empty)
-                return Outcome("back at the start")
-            case "set_pose":
-                return Outcome(self._put(**arguments))
-            case "add":
-                return self._add(**arguments)
-            case "delete":
-                known = self._known_body(name, arguments["body"])
-                return Outcome(self._done_to(known, "delete", Delete))
-            case "restore":
-                return Outcome(done(f"{front}restore", Delete, arguments["body"]))
-        raise Error(f"{name}: is not possible in a simulation")
+        if name not in ABILITIES:
+            raise Error(f"{name}: is not possible in a simulation")
+        outcome: Outcome = getattr(self, f"_do_{name}")(**arguments)
+        return outcome
 
-    def _put(self, body: str, x: float, y: float, yaw: float) -> str:
+    def _do_pause(self, on: bool) -> Outcome:
+        return Outcome(done(f"{self._services}pause", SetBool, on))
+
+    def _do_step(self) -> Outcome:
+        return Outcome(done(f"{self._services}step", Trigger))
+
+    def _do_speed(self, value: float) -> Outcome:
+        return Outcome(done(f"{self._services}speed", Speed, value))
+
+    def _do_seed(self, value: int) -> Outcome:
+        return Outcome(done(f"{self._services}seed", Seed, value))
+
+    def _do_reset(self) -> Outcome:
+        call(f"{self._services}reset", Empty)
+        return Outcome("back at the start")
+
+    def _do_save_world(self) -> Outcome:
+        answer = call(f"{self._services}save_world", SaveWorld)
+        if not answer.success:
+            raise Error(answer.message)
+        return Outcome(str(answer.message), str(answer.world))
+
+    def _do_delete(self, body: str) -> Outcome:
+        return Outcome(self._done_to(self._known_body("delete", body), "delete", Delete))
+
+    def _do_restore(self, body: str) -> Outcome:
+        return Outcome(done(f"{self._services}restore", Delete, body))
+
+    def _do_set_pose(self, body: str, x: float, y: float, yaw: float) -> Outcome:
         known = self._known_body("set_pose", body)
-        return self._done_to(known, "set_pose", SetPose, Pose(Point(x, y, known["z"]), quaternion_of(yaw)))
+        return Outcome(self._done_to(known, "set_pose", SetPose, Pose(Point(x, y, known["z"]), quaternion_of(yaw))))
 
-    def _add(self, kind: str, x: float, y: float, yaw: float, length: float, width: float, **to: float) -> Outcome:
+    def _do_add(self, kind: str, x: float, y: float, yaw: float, length: float, width: float, **to: float) -> Outcome:
         """Add a box, a wall or a person, who walks if it is said to where."""
         if len(to) == 1:
             raise Error("add: to_x and to_y belong together")

@@ -122,6 +122,13 @@ click("screenshot", () => picture.flat().toBlob((blob) => {
   say("The picture was saved.");
 }));
 
+click("save-world", async () => {
+  const reply = await ask("save_world");
+  if (!reply.ok) return;
+  download(new Blob([reply.result], {type: "text/plain"}), "saved.world");
+  say(`The world was saved as it is ${reply.message}.`);
+});
+
 permit.on("change", () => {
   // the panel of effects is the one to begin with where there are any
   if (tabs.current?.hidden) tabs.show("view");

@@ -14,9 +14,14 @@ class Subject {
     Object.assign(this, {id, added: id === null, there: id !== null});
   }
 
-  be(there) {
+  /** Be there or not from now on; bodies: of the world that is shown, which may know already, or not yet. */
+  be(there, bodies) {
     this.there = there;
-    this.matched = false;
+    this.matched = this.in(bodies) === there;
+  }
+
+  in(bodies) {
+    return bodies.some(({id}) => id === this.id);
   }
 }
 
@@ -25,6 +30,7 @@ export class History {
   #undone = [];
   #subjects = new Map(); // by id
   #busy = Promise.resolve();
+  #waiting = 0; // edits whose reply is yet to come, though the world may come before it
 
   /** ask(name, values): a command, failures are said elsewhere; say(text). */
   constructor(scene, permit, ask, say) {
@@ -42,7 +48,7 @@ export class History {
     const forth = async () => {
       const reply = subject.id === null ? await this.ask("add", values) : await this.ask("restore", {body: subject.id});
       if (reply.ok && subject.id === null) this.#subjects.set((subject.id = reply.result), subject);
-      if (reply.ok) subject.be(true);
+      if (reply.ok) subject.be(true, this.#bodies);
       return reply;
     };
     const reply = await this.#do({what: `adding a ${values.kind}`, forth, back: () => this.#delete(subject)});
@@ -54,7 +60,7 @@ export class History {
     const subject = this.#subject(id);
     const back = async () => {
       const reply = await this.ask("restore", {body: subject.id});
-      if (reply.ok) subject.be(true);
+      if (reply.ok) subject.be(true, this.#bodies);
       return reply;
     };
     this.#do({what: `deleting ${name}`, forth: () => this.#delete(subject), back});
@@ -79,12 +85,16 @@ export class History {
   rewound() {
     for (const subject of this.#subjects.values()) {
       if (subject.added) subject.id = null;
-      subject.be(!subject.added);
+      subject.be(!subject.added, this.#bodies);
     }
     this.#subjects.clear();
     this.#undone.push(...this.#done.reverse());
     this.#done = [];
     this.#show();
+  }
+
+  get #bodies() {
+    return this.scene.world.bodies;
   }
 
   #subject(id) {
@@ -94,13 +104,14 @@ export class History {
 
   async #delete(subject) {
     const reply = await this.ask("delete", {body: subject.id});
-    if (reply.ok) subject.be(false);
+    if (reply.ok) subject.be(false, this.#bodies);
     return reply;
   }
 
   /** One after another: the next may need the id that the one before makes. */
   #one(action) {
-    this.#busy = this.#busy.then(action);
+    this.#waiting += 1;
+    this.#busy = this.#busy.then(action).finally(() => (this.#waiting -= 1));
     return this.#busy;
   }
 
@@ -133,10 +144,10 @@ export class History {
 
   /** See whether somebody else has put the world back: what was there is gone, or the other way round. */
   #compare() {
-    const known = new Set(this.scene.world.bodies.map(({id}) => id));
+    if (this.#waiting) return;
     for (const subject of this.#subjects.values()) {
-      const agrees = known.has(subject.id) === subject.there;
-      if (!agrees && subject.matched) return this.rewound();
+      const agrees = subject.in(this.#bodies) === subject.there;
+      if (!agrees && subject.matched) return void this.rewound();
       subject.matched = agrees;
     }
   }
