@@ -19,6 +19,7 @@ import {Options} from "./panels/options.js";
 import {added} from "./picture/palette.js";
 import {Permit} from "./server/permit.js";
 import {Places} from "./report/places.js";
+import {Plot} from "./plot/plot.js";
 import {Pointer} from "./picture/pointer.js";
 import {Recording} from "./panels/recording.js";
 import {Residuals} from "./panels/residuals.js";
@@ -91,6 +92,7 @@ const pointer = new Pointer(byId("front"), picture, {
   panned: () => options.follow !== null && options.set({follow: null}),
 });
 new Effects(scene, permit, ask, say);
+new Plot(scene, picture);
 new BodyPanel(scene, options, permit, ask, say, edits);
 
 function chosen() {
