@@ -5,7 +5,7 @@ import math
 
 from playwright.sync_api import expect
 from test_viewer_page_control import drag, near
-from viewer_page_rig import Shown, Visit, until
+from viewer_page_rig import HOSTILE, Shown, Visit, until
 from viewer_rig import ABILITIES
 
 
@@ -50,6 +50,23 @@ def test_a_robot_is_only_told_of_its_goal(browser):
         expect(visit.page.locator("#go")).to_be_hidden()
         for id in ("box", "undo", "delete"):
             expect(visit.page.locator(f"#{id}")).to_be_hidden()
+
+
+def test_frames_are_listed_as_a_tree_also_for_who_only_looks(browser):
+    with Shown(control=False) as shown, Visit(browser, shown.link) as visit:
+        visit.page.locator("#frames-list").click()
+        rows = visit.page.locator("#frames-tree li")
+        expect(rows).to_have_text(
+            [
+                "maproot",
+                f"{HOSTILE}1.0 Hz, /somebody",
+                "odomroot",
+                "base_link20.0 Hz, /somebody",
+                "laserstatic, /somebody",
+            ]
+        )
+        expect(visit.page.locator("#frames-count")).to_have_text("3 transforms")
+        assert shown.rig.commands == [("frames", {})]
 
 
 def test_who_only_looks_sets_none(browser):

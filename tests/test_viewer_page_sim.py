@@ -152,3 +152,14 @@ def test_a_saved_world_is_read_again_with_all_where_it_was(simulator, tmp_path):
     model, dynamics = load_model(shipped("launch/md100.yaml")), load_dynamics(shipped("launch/physical.yaml"))
     chair = ChairSimulator(model, world, dynamics)
     assert chair.chair_pose[:2] == pytest.approx(here["chair"][:2], abs=6e-4)
+
+
+def test_the_frames_of_tf_are_listed(simulator, tmp_path):
+    page = simulator.page
+    page.locator("#tab-view").click()
+    page.locator("#frames-list").click()
+    rows = page.locator("#frames-tree li")
+    expect(rows.first).to_have_text("odomroot")
+    expect(rows.nth(1)).to_have_text(re.compile(r"base_link\d+\.\d Hz, /base_node"))
+    expect(rows.filter(has_text="laserstatic")).to_have_count(1)
+    page.screenshot(path=tmp_path / "frames.png")

@@ -4,6 +4,7 @@
 By hand: scripts/run python tests/viewer_page_rig.py
 """
 
+import json
 import math
 import os
 import threading
@@ -138,6 +139,11 @@ class PageRig(Rig):
         self.gone.remove(body)
         self.show_world()
         return Outcome("it is back")
+
+    def do_frames(self):
+        names = [("odom", "base_link", 20.0), ("base_link", "laser", None), ("map", HOSTILE, 1.0)]
+        rows = [{"parent": p, "child": c, "node": "/somebody", "rate": rate} for p, c, rate in names]
+        return Outcome("", json.dumps(rows))
 
     def do_save_world(self):
         return Outcome("at 1.000 s: 3 models", "a world\n")

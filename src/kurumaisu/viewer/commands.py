@@ -92,6 +92,7 @@ COMMANDS: Mapping[str, _Kinds] = {
     "goal": {"x": _number, "y": _number, "yaw": _number},
     "go": {},
     "forget_goal": {},
+    "frames": {},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
 _OPTIONAL: Mapping[str, _Kinds] = {
@@ -99,6 +100,9 @@ _OPTIONAL: Mapping[str, _Kinds] = {
     "go": {"body": _word},
     "add": {"to_x": _number, "to_y": _number},  # where a person walks to, and back
 }
+
+
+OPEN = frozenset({"frames"})  # who only looks may give these, too: they change nothing
 
 
 def read(message: str) -> Request | Credential:

@@ -42,6 +42,7 @@ class Hello:
     session: str | None = None  # only after a token
     report: str | None = None  # address of the critic's report, if there is one
     new_token: str | None = None  # command that prints an address with a token
+    open: tuple[str, ...] = ()  # commands that need no control
     version: int = VERSION
 
 

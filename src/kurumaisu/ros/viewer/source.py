@@ -18,6 +18,7 @@ from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.viewer import simulation
 from kurumaisu.ros.viewer.chair import Chair
 from kurumaisu.ros.viewer.effects import EffectSwitches
+from kurumaisu.ros.viewer.frames import Frames
 from kurumaisu.ros.viewer.goal import DrivenGoals, Goals
 from kurumaisu.ros.viewer.maps import Maps
 from kurumaisu.ros.viewer.notes import RosoutNotes
@@ -121,7 +122,7 @@ class RosSource:
 
     def _own_commands(self) -> dict[str, Callable[..., Outcome]]:
         """Return what obeys each command that is not the scene's."""
-        does: dict[str, Callable[..., Outcome]] = {"record": self._bags.record}
+        does: dict[str, Callable[..., Outcome]] = {"record": self._bags.record, "frames": Frames().list}
         if self._initial is not None:
             does["initial_pose"] = self._guess
         if self._goals is not None:

@@ -12,6 +12,7 @@ import {byId} from "./common/dom.js";
 import {Edit} from "./picture/edit.js";
 import {Effects} from "./panels/effects.js";
 import {download} from "./common/download.js";
+import {Frames} from "./panels/frames.js";
 import {GoalPanel} from "./panels/goal.js";
 import {History} from "./panels/history.js";
 import {keyTable, listen} from "./panels/keys.js";
@@ -93,6 +94,7 @@ const pointer = new Pointer(byId("front"), picture, {
 });
 new Effects(scene, permit, ask, say);
 new Plot(scene, picture);
+new Frames(scene, ask);
 new BodyPanel(scene, options, permit, ask, say, edits);
 
 function chosen() {
