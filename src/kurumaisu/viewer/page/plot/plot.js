@@ -8,6 +8,7 @@ import {numbers} from "./numbers.js";
 import {Series} from "./series.js";
 
 const MOST = 6; // curves
+const NOTHING = 1e-9; // a number so small is rounding
 const PERIOD = 100; // [ms] between pictures
 const FIRST = ["v", "commanded.0"]; // what is shown until somebody chooses
 
@@ -99,7 +100,7 @@ export class Plot {
 
   #showValue({series, unit, read, swatch}, {color, dash}) {
     const value = series.values.at(-1);
-    setText(read, Number.isFinite(value) ? `${short(value)} ${unit}` : "–");
+    setText(read, Number.isFinite(value) ? `${short(Math.abs(value) < NOTHING ? 0 : value)} ${unit}` : "–");
     const context = swatch.getContext("2d");
     context.clearRect(0, 0, 28, 10);
     context.setLineDash(dash);
