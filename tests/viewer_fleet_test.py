@@ -64,6 +64,7 @@ class ViewerFleetTest(unittest.TestCase):
             assert "cannot be driven" in reply["message"]
 
     def test_all_rangers_are_seen(self):
+        self.page.scans.clear()  # bodies that came and went had other places
         self.page.wait(lambda: len(self.page.scans) == 2, "both rangers")
         place = self.page.newest["world"]["bodies"].index(self.bodies["scout"])
         front, rear = (self.page.scans[place | number << 16] for number in (0, 1))
