@@ -96,6 +96,12 @@ class Services(Case):
         self.step()
         assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()
         assert place(self.truth.last) == (1, 0.5, 0)
+        assert self.ask("delete", Delete, "second").success
+        self.step()
+        assert len(self.transforms()) == 3
+        assert self.ask("restore", Delete, "second").success
+        self.step()
+        assert ("/robot_1/odom", "/robot_1/base_footprint") in self.transforms()  # under its old name
         assert self.ask("delete", Delete, "target").success
         self.step()
         assert self.scan.last.ranges[2] == pytest.approx(3.89, abs=1e-5)

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from kurumaisu._core import integrate
-from kurumaisu.driving import Route, RouteFollower, load_route
+from kurumaisu.driving import Manner, PoseFollower, Route, RouteFollower, load_route
 from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
 from kurumaisu.params import shipped
 from kurumaisu.sim.chair.joystick import joystick
 
@@ -70,3 +71,38 @@ def test_joystick_excites_everything_and_ends_at_rest():
     assert min((v > 0).mean(), (w > 0).mean(), (w < 0).mean()) > 0.2
     assert (v < 0).any()
     assert (v[:-1] == 0).any()
+
+
+MANNER = Manner(gain=1.0, reach=0.05, aim=0.035, patience=8.0)
+
+
+def seek(goal, pose, seconds, period=0.05):
+    """Return the driver and the path [m, m, rad] to a goal."""
+    driver, path = PoseFollower(np.array(goal), MANNER, 0.5, 0.8), [np.array(pose)]
+    for step in range(round(seconds / period)):
+        v, w = driver.command(path[-1], step * period)
+        assert 0.0 <= v <= 0.5
+        assert abs(w) <= 0.8
+        path.append(integrate(np.array([v]), np.array([w]), np.array([period]), list(path[-1]))[-1])
+    return driver, np.array(path)
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0, np.pi, -2.0, 7.0])
+@pytest.mark.parametrize("goal", [(2.0, 1.0, -2.5), (-1.0, 0.0, 3.1), (0.0, 0.0, 1.0)])
+def test_a_pose_is_reached_from_any_heading(goal, heading):
+    driver, path = seek(goal, [0.0, 0.0, heading], 40.0)
+    assert driver.done
+    assert not driver.gave_up(40.0) or driver.done
+    assert np.hypot(*(path[-1, :2] - goal[:2])) < 2 * MANNER.reach
+    assert abs(wrap(path[-1, 2] - goal[2])) < MANNER.aim
+    assert (path[-1] == path[-20]).all()  # it rests there
+
+
+def test_who_comes_no_closer_gives_up():
+    driver, stuck = PoseFollower(np.array([3.0, 0.0, 0.0]), MANNER, 0.5, 0.8), np.array([0.0, 0.0, 0.0])
+    for now in np.arange(0.0, 8.0, 0.1):
+        driver.command(stuck, now)
+        assert not driver.gave_up(now)
+    driver.command(stuck, 8.2)
+    assert driver.gave_up(8.2)
+    assert not driver.done

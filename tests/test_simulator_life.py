@@ -95,10 +95,10 @@ def test_states_of_another_world_are_refused(tmp_path: Path) -> None:
     [
         (b"", "is no saved state"),
         (b"nonsense", "is no saved state"),
-        (b"kurumaisu state 1\n\x80\x04N.", "is of version 1; this program reads and writes version 2"),
-        (b"kurumaisu state 3 " + b"0" * 64 + b"\n", "is of version 3"),
-        (b"kurumaisu state 2\n{}", "is damaged or cut"),
-        (b"kurumaisu state 2 " + b"0" * 64 + b"\n{}", "is damaged or cut"),
+        (b"kurumaisu state 1\n\x80\x04N.", "is of version 1; this program reads and writes version 3"),
+        (b"kurumaisu state 4 " + b"0" * 64 + b"\n", "is of version 4"),
+        (b"kurumaisu state 3\n{}", "is damaged or cut"),
+        (b"kurumaisu state 3 " + b"0" * 64 + b"\n{}", "is damaged or cut"),
     ],
 )
 def test_other_bytes_are_refused(tmp_path: Path, damage: bytes, message: str) -> None:
@@ -112,7 +112,7 @@ def test_other_bytes_are_refused(tmp_path: Path, damage: bytes, message: str) ->
 def sealed(text: str, data: bytes = b"") -> bytes:
     """Return bytes that begin with the digest of the rest, whatever that is."""
     body = text.encode() + b"\n" + data
-    return f"kurumaisu state 2 {hashlib.sha256(body).hexdigest()}\n".encode() + body
+    return f"kurumaisu state 3 {hashlib.sha256(body).hexdigest()}\n".encode() + body
 
 
 @pytest.mark.parametrize(
@@ -272,6 +272,45 @@ def test_a_robot_comes_and_goes(tmp_path: Path) -> None:
     sim.delete("r1")
     assert sim.state_hash() == hashed
     assert len(sim.reset(0).poses) == 4
+
+
+def keys_of(sim: Simulator) -> dict[str, int]:
+    keys = sim.machinery.population.keys.tolist()
+    return {m.name: key for m, key in zip(sim.models, keys, strict=True) if m.name}
+
+
+def test_what_was_deleted_comes_back(tmp_path: Path) -> None:
+    text = (
+        'model ( name "table" pose [3 3 0 0] size [1 1 0.5] model ( name "vase" pose [0.2 0 0 0] size [0.1 0.1 0.3] ) )'
+    )
+    sim = simulator(tmp_path, CROWD + text)
+    wander(sim, 5)
+    keys = keys_of(sim)
+    before = {m.name: pose for m, pose in zip(sim.models, sim.model_poses.tolist(), strict=True) if m.name}
+    for name in ("vase", "r1", "table"):
+        sim.delete(name)
+    with pytest.raises(Error, match=f"model vase: stood on model #{keys['table']}, which is not there"):
+        sim.restore("vase")
+    for name in (f"#{keys['table']}", "vase", "r1"):
+        sim.restore(name)
+    after = {m.name: pose for m, pose in zip(sim.models, sim.model_poses.tolist(), strict=True) if m.name}
+    assert after == before
+    assert keys_of(sim) == keys
+    places = {m.name: m.index for m in sim.models}
+    assert sim.models[places["vase"]].root == sim.models[places["vase"]].parent == places["table"]
+    hashed = sim.state_hash()
+    sim.load(sim.save())
+    assert sim.state_hash() == hashed
+    wander(sim, 3)
+
+
+def test_no_number_is_given_twice(tmp_path: Path) -> None:
+    sim = crowd(tmp_path)
+    first = sim.spawn('model ( name "a" )', [3, 3, 0, 0])
+    sim.delete(first)
+    assert sim.spawn('model ( name "a" )', [3, 3, 0, 0]) != first
+    with pytest.raises(Error, match="name 'a': there is a model of this name"):
+        sim.restore(first)
 
 
 def test_a_guest_changes_nothing_for_the_others(tmp_path: Path) -> None:

@@ -9,13 +9,13 @@ from sim_worlds import ROOM, drive, robot, simulator
 
 from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
-from kurumaisu.ros.stageros.added_models import renumbered
 from kurumaisu.ros.stageros.names import Names
 from kurumaisu.ros.stageros.rates import Pace
 from kurumaisu.ros.stageros.saved_names import with_names, without_names
 from kurumaisu.ros.stageros.settings import read_settings
 from kurumaisu.ros.stageros.truth import GroundTruth
 from kurumaisu.sim.robots import state
+from kurumaisu.sim.robots.newcomers import renumbered
 from kurumaisu.world.layout import family
 
 

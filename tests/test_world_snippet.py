@@ -39,6 +39,15 @@ def test_the_macros_units_and_parameters_of_the_file_hold(tmp_path: Path) -> Non
     assert eye.device.fans[0].range_max == pytest.approx(3.0)
 
 
+def test_a_text_may_have_units_of_its_own(tmp_path: Path) -> None:
+    known = world(tmp_path)
+    text = 'unit_length "m" unit_angle "radians" model ( pose [1 0 0 0.5] size [2 1 1] )'
+    (model,) = read_snippet(text, known.vocabulary).models
+    np.testing.assert_allclose((*model.pose, *model.size), [1, 0, 0, 0.5, 2, 1, 1])
+    (model,) = read_snippet("model ( pose [1 0 0 180] size [2 1 1] )", known.vocabulary).models
+    np.testing.assert_allclose((*model.pose, *model.size), [0.01, 0, 0, np.pi, 0.02, 0.01, 0.01])
+
+
 def test_a_text_may_define_and_the_world_does_not_learn_it(tmp_path: Path) -> None:
     known = world(tmp_path)
     text = "define tall cart ( size [40 30 90] )\ntall ( )"

@@ -19,7 +19,7 @@ from kurumaisu.ros.viewer.calls import call
 class ViewerFleetTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        rospy.wait_for_service("viewer_node/new_token", PATIENCE)
+        rospy.wait_for_service("viewer_node/new_token")
         cls.address = call("viewer_node/new_token", Trigger).message
         cls.page = Page(cls.address)
         cls.page.let_in(cls.address)
@@ -64,6 +64,7 @@ class ViewerFleetTest(unittest.TestCase):
             assert "cannot be driven" in reply["message"]
 
     def test_all_rangers_are_seen(self):
+        self.page.scans.clear()  # bodies that came and went had other places
         self.page.wait(lambda: len(self.page.scans) == 2, "both rangers")
         place = self.page.newest["world"]["bodies"].index(self.bodies["scout"])
         front, rear = (self.page.scans[place | number << 16] for number in (0, 1))
@@ -93,6 +94,40 @@ class ViewerFleetTest(unittest.TestCase):
         before = self.page.newest["state"]["contacts"].get(porter, 0)
         state = self.drive("porter", 0.6, lambda state: state["contacts"].get(porter, 0) > before)
         assert state["poses"][porter][0] > 3.5  # at the wall
+
+    def test_a_robot_is_driven_to_a_goal(self):
+        porter = self.bodies["porter"]["id"]
+        assert "there is no goal" in self.page.ask("go", body=porter)["message"]
+        assert self.page.ask("goal", x=2.0, y=-1.0, yaw=1.0)["ok"]
+        assert "cannot be driven" in self.page.ask("go", body="moon")["message"]
+        assert self.page.ask("go", body=porter)["ok"]
+        state = self.page.state(lambda state: state["goal"]["text"] == "arrived", "the arrival")
+        np.testing.assert_allclose(state["poses"][porter], [2.0, -1.0, 1.0], atol=0.12)
+        assert (state["goal"]["body"], state["goal"]["driving"]) == (porter, False)
+        assert self.page.ask("goal", x=2.0, y=9.0, yaw=1.0)["ok"]  # behind a wall
+        assert self.page.ask("go", body=porter)["ok"]
+        self.page.state(lambda state: state["goal"]["driving"], "that it drives")
+        self.page.say(type="command", id=0, name="drive", v=0.0, w=0.0, body=porter)
+        self.page.state(lambda state: state["goal"]["text"] == "ended: driven by hand", "a hand on the stick")
+        assert self.page.ask("forget_goal")["ok"]
+        self.page.state(lambda state: state["goal"] is None, "no goal")
+
+    def test_a_robot_leaves_and_comes_back_and_the_world_is_saved(self):
+        added = self.page.ask("add", kind="wall", x=0.0, y=-2.0, yaw=0.0, length=4.0, width=0.1)["result"]
+        porter = self.bodies["porter"]["id"]
+        assert self.page.ask("delete", body=porter)["ok"]
+
+        def ids():
+            return {body["id"]: body for body in self.page.newest["world"]["bodies"]}
+
+        self.page.wait(lambda: added in ids() and porter not in ids(), "another world")
+        assert ids()[added]["movable"]  # though longer than what is taken for a thing
+        saved = self.page.ask("save_world")["result"]
+        assert 'name "wall 1"' in saved
+        assert 'name "porter"' not in saved
+        assert self.page.ask("restore", body=porter)["ok"]
+        self.page.wait(lambda: porter in ids(), "the robot again")
+        self.drive("porter", -0.4, lambda state: porter in state["poses"] and state["poses"][porter][0] < 2.8)
 
     def test_a_refused_pose_names_the_body_and_not_its_number(self):
         reply = self.page.ask("set_pose", body=self.bodies["porter"]["id"], x=1e300, y=0.0, yaw=0.0)

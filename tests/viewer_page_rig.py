@@ -4,6 +4,7 @@
 By hand: scripts/run python tests/viewer_page_rig.py
 """
 
+import json
 import math
 import os
 import threading
@@ -17,7 +18,7 @@ from viewer_rig import BEAMS, CHAIR, HALF, Rig, room_ranges, viewer_settings, wo
 
 from kurumaisu import effects
 from kurumaisu.errors import Error
-from kurumaisu.viewer import Body, Fan, Group, Hub, Note, Outcome, PlaybackState, Server, Value, World
+from kurumaisu.viewer import Body, Fan, Goal, Group, Hub, Note, Outcome, PlaybackState, Server, Value, World
 
 HOSTILE = "<img src=x onerror=alert(1)>"
 BAG = frozenset({"seek", "play", "rate"})
@@ -82,6 +83,8 @@ class PageRig(Rig):
         self.acting = {}
         self.robots = robots
         self.contacts = {}
+        self.goal = None
+        self.added, self.gone, self._last = {}, set(), 90  # by ids; the last one's number
         self.rear = None  # [m] that a second ranger of the chair, which looks back, sees everywhere
         self.playback = PlaybackState(100.0, 100.0 + LONG, 100.0, 1.0, False) if others.get("mode") == "bag" else None
         super().__init__(hub, **others)
@@ -107,6 +110,67 @@ class PageRig(Rig):
         """Return the arguments of every command of a name so far."""
         return [arguments for one, arguments in list(self.commands) if one == name]
 
+    def do_add(self, kind, x, y, yaw, length, width, **_to):
+        if x > HALF:
+            raise Error(f"{kind} 1: would stand in a wall")
+        self._last += 1
+        a, b = length / 2, width / 2
+        body = Body(
+            f"#{self._last}",
+            f"{kind} {self._last}",
+            "obstacle",
+            "#8b7355",
+            True,
+            (((a, b), (-a, b), (-a, -b), (a, -b)),),
+        )
+        self.added[body.id] = body
+        self.poses[body.id] = (x, y, yaw)
+        self.show_world()
+        return Outcome(f"{body.name} was added", body.id)
+
+    def do_delete(self, body):
+        self.gone.add(body)
+        self.show_world()
+        return Outcome("deleted")
+
+    def do_restore(self, body):
+        if body not in self.gone:
+            raise Error(f"model {body}: was not deleted")
+        self.gone.remove(body)
+        self.show_world()
+        return Outcome("it is back")
+
+    def do_frames(self):
+        names = [("odom", "base_link", 20.0), ("base_link", "laser", None), ("map", HOSTILE, 1.0)]
+        rows = [{"parent": p, "child": c, "node": "/somebody", "rate": rate} for p, c, rate in names]
+        return Outcome("", json.dumps(rows))
+
+    def do_save_world(self):
+        return Outcome("at 1.000 s: 3 models", "a world\n")
+
+    def do_goal(self, x, y, yaw):
+        self.goal = Goal((x, y, yaw))
+        return Outcome("published on /move_base_simple/goal, no nodes listening")
+
+    def do_go(self, body=None):
+        self.goal = replace(self.goal, body=body or "1", driving=True, text="driving there")
+        return Outcome("driving there")
+
+    def do_forget_goal(self):
+        self.goal = None
+        return Outcome("no goal")
+
+    def do_reset(self):
+        self.added, self.gone, self._last = {}, set(), 90
+        self.show_world()
+        return super().do_reset()
+
+    def show_world(self):
+        """Put what there is now into the hub."""
+        known = crowd(self.robots)
+        bodies = [body for body in (*known.bodies, *self.added.values()) if body.id not in self.gone]
+        self.hub.world(replace(known, bodies=tuple(bodies)))
+
     def do_seek(self, t):
         self.playback = replace(self.playback, t=t)
         return Outcome("there")
@@ -121,7 +185,11 @@ class PageRig(Rig):
     def dressed(self, state):
         """Return the moment with a playback and a note that wants to be HTML."""
         return replace(
-            state, playback=self.playback, contacts=dict(self.contacts), notes=(Note("warning", f"MADE_UP {HOSTILE}"),)
+            state,
+            goal=self.goal,
+            playback=self.playback,
+            contacts=dict(self.contacts),
+            notes=(Note("warning", f"MADE_UP {HOSTILE}"),),
         )
 
     def more_scans(self):

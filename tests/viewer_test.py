@@ -143,6 +143,43 @@ class ViewerTest(unittest.TestCase):
         )
         self.page.wait(lambda: 77 in self.page.replies or None in self.page.replies, "a refusal")
 
+    def names(self, condition, what):
+        """Return the names of all bodies when they are as wanted."""
+
+        def now():
+            return {body["name"] for body in self.page.newest["world"]["bodies"]}
+
+        self.page.wait(lambda: condition(now()), what)
+        return now()
+
+    def test_add_delete_and_restore(self):
+        middle = {"y": 0.0, "yaw": 0.0, "length": 0.5, "width": 0.4}
+        id = self.do("add", kind="box", x=1.2, **middle)["result"]
+        self.names(lambda names: "box 1" in names, "the box")
+        assert self.pose("box 1") == pytest.approx([1.2, 0.0, 0.0], abs=1e-6)
+        scan = self.page.counts["scan"]
+        self.page.wait(lambda: self.page.counts["scan"] > scan + 2, "new scans")
+        ranges, _ = errors_of(next(iter(self.page.scans.values())))
+        assert np.nanmin(ranges[330:350]) < 0.8  # the laser sees it
+        assert self.refused("add", kind="wall", x=0.0, **middle) == (
+            "wall 1: the chair is in the way: it would overlap wall 1"
+        )
+        assert self.refused("add", kind="moon", x=2.0, **middle) == "add: kind must be one of box, wall, person: 'moon'"
+        too_long = self.refused("add", kind="wall", x=2.0, **middle | {"length": 101})
+        assert too_long == "add: length must be from 0.02 m to 100 m: 101 m"
+        assert self.refused("delete", body=self.body("chair")) == "chair: a robot cannot leave a world that runs"
+        self.do("delete", body=id)
+        self.names(lambda names: "box 1" not in names, "the end of the box")
+        assert "there is none" in self.refused("delete", body=id)
+        self.do("restore", body=id)
+        self.names(lambda names: "box 1" in names, "the box again")
+        assert self.body("box 1") == id
+        self.do("add", kind="person", x=-2.0, **middle, to_x=-2.0, to_y=2.0)
+        self.names(lambda names: "person 1" in names, "the person")
+        self.pose("person 1", lambda pose: pose[1] > 0.2)  # walks
+        self.do("reset")
+        self.names(lambda names: not names & {"box 1", "person 1"}, "the world of the file")
+
     def test_drive_with_a_dead_man(self):
         topic = Topic("viewer_vel", Twist)
         start = self.page.state(lambda state: state["driver"] == "", "nobody to drive")["truth"]

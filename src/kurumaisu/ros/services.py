@@ -24,12 +24,19 @@ from kurumaisu.errors import Error
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
+from kurumaisu.sim.robots.saved_world import Scene, world_file
 from kurumaisu.sim.robots.state_folder import StateFolder
 from kurumaisu.srv import (
+    Delete,
+    DeleteRequest,
+    SaveWorld,
+    SaveWorldRequest,
     Seed,
     SeedRequest,
     SetPose,
     SetPoseRequest,
+    Spawn,
+    SpawnRequest,
     Speed,
     SpeedRequest,
     StateFile,
@@ -56,6 +63,18 @@ class Simulation(Protocol):
     def set_pose(self, name: str, pose: FloatArray) -> None:
         """Put a model to a pose (4,)."""
 
+    def spawn(self, like: str, name: str, pose: FloatArray) -> str:
+        """Add a copy of a model, or what a text describes, at a pose (4,); return `#` and its key."""
+
+    def delete(self, name: str) -> None:
+        """Take a model away."""
+
+    def restore(self, name: str) -> None:
+        """Bring back a model that was deleted."""
+
+    def scene(self) -> Scene:
+        """Return what there is now."""
+
     def save(self) -> bytes:
         """Return the whole state."""
 
@@ -64,7 +83,7 @@ class Simulation(Protocol):
 
 
 class Services:
-    """Advertises reset, pause, step, speed, seed, set_pose, save and load."""
+    """Advertises reset, pause, step, speed, seed, set_pose, spawn, delete, restore, save_world, save and load."""
 
     def __init__(
         self, simulation: Simulation, requests: Requests, pacer: Pacer, states: StateFolder, prefix: str
@@ -81,6 +100,10 @@ class Services:
             rospy.Service(prefix + "speed", Speed, self._speed),
             rospy.Service(prefix + "seed", Seed, self._seed),
             rospy.Service(prefix + "set_pose", SetPose, self._set_pose),
+            rospy.Service(prefix + "spawn", Spawn, self._spawn),
+            rospy.Service(prefix + "delete", Delete, self._delete),
+            rospy.Service(prefix + "restore", Delete, self._restore),
+            rospy.Service(prefix + "save_world", SaveWorld, self._save_world),
             rospy.Service(prefix + "save", StateFile, self._save),
             rospy.Service(prefix + "load", StateFile, self._load),
         ]
@@ -114,6 +137,32 @@ class Services:
 
     def _set_pose(self, request: SetPoseRequest) -> tuple[bool, str]:
         return self._outcome(lambda: self._simulation.set_pose(request.name, pose_of(request.pose)))
+
+    def _spawn(self, request: SpawnRequest) -> tuple[bool, str, str]:
+        key = ""
+
+        def spawn() -> None:
+            nonlocal key
+            key = self._simulation.spawn(request.like, request.name, pose_of(request.pose))
+
+        success, message = self._outcome(spawn)
+        return success, message, key
+
+    def _delete(self, request: DeleteRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: self._simulation.delete(request.name))
+
+    def _restore(self, request: DeleteRequest) -> tuple[bool, str]:
+        return self._outcome(lambda: self._simulation.restore(request.name))
+
+    def _save_world(self, _request: SaveWorldRequest) -> tuple[bool, str, str]:
+        scenes: list[Scene] = []
+        success, message = self._outcome(lambda: scenes.append(self._simulation.scene()))
+        if not success:
+            return False, message, ""
+        try:  # by this thread: the simulation need not wait for it
+            return True, f"{message}: {len(scenes[0].models)} models", world_file(scenes[0])
+        except Error as error:
+            return False, str(error), ""
 
     def _save(self, request: StateFileRequest) -> tuple[bool, str]:
         return self._outcome(lambda: self._states.write(request.file, self._simulation.save()))

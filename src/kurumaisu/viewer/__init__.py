@@ -2,7 +2,19 @@
 """A page for any browser: shows a simulation, a chair or a recording, and what may be done to them. Knows no ROS."""
 
 from kurumaisu.viewer.hub import Hub
-from kurumaisu.viewer.protocol import Body, Estimate, Fan, Group, MapPicture, Note, PlaybackState, State, Value, World
+from kurumaisu.viewer.protocol import (
+    Body,
+    Estimate,
+    Fan,
+    Goal,
+    Group,
+    MapPicture,
+    Note,
+    PlaybackState,
+    State,
+    Value,
+    World,
+)
 from kurumaisu.viewer.server import Server
 from kurumaisu.viewer.settings import ViewerSettings, read_settings
 from kurumaisu.viewer.source import Outcome, Source
@@ -11,6 +23,7 @@ __all__ = [
     "Body",
     "Estimate",
     "Fan",
+    "Goal",
     "Group",
     "Hub",
     "MapPicture",

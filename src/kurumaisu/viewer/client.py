@@ -17,7 +17,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from kurumaisu.errors import Error
 from kurumaisu.viewer import commands, protocol
 from kurumaisu.viewer.access import AccessTokens
-from kurumaisu.viewer.commands import Credential, Request
+from kurumaisu.viewer.commands import OPEN, Credential, Request
 from kurumaisu.viewer.hub import Hub, Mailbox, Payload
 from kurumaisu.viewer.seats import Seats
 from kurumaisu.viewer.settings import ViewerSettings
@@ -52,7 +52,7 @@ class Client:
         workers: Mapping[str, Executor],
         seats: Seats,
     ) -> None:
-        """keys: None where nobody may command; workers: who does each urgent command, and under "" all others."""
+        """keys: None where nobody may command; workers: for each urgent or open command, and "" for all others."""
         self._settings = settings
         self._hub = hub
         self._source = source
@@ -185,7 +185,7 @@ class Client:
         if isinstance(said, Credential):
             self._let_in(said)
             return
-        if not self._control:
+        if not self._control and said.name not in OPEN:
             raise Error(f"{said.name}: {_why_not(self._keys)}")
         if said.name not in self._source.abilities:
             raise Error(f"{said.name}: is not possible in the mode {self._source.mode}")
@@ -233,7 +233,7 @@ class Client:
 
     def _run(self, command: Request) -> asyncio.Future[None]:
         done = asyncio.get_running_loop().run_in_executor(
-            self._workers[command.name if command.name in URGENT else ""], self._do, command
+            self._workers.get(command.name, self._workers[""]), self._do, command
         )
 
         async def answer() -> None:
@@ -269,6 +269,7 @@ class Client:
             session,
             self._hub.report,
             self._hub.new_token,
+            tuple(sorted(OPEN & source.abilities)),
         )
 
 

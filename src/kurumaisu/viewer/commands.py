@@ -76,6 +76,10 @@ COMMANDS: Mapping[str, _Kinds] = {
     "reset": {},
     "seed": {"value": _seed},
     "set_pose": {"body": _word, "x": _number, "y": _number, "yaw": _number},
+    "add": {"kind": _word, "x": _number, "y": _number, "yaw": _number, "length": _number, "width": _number},
+    "delete": {"body": _word},
+    "restore": {"body": _word},
+    "save_world": {},
     "drive": {"v": _number, "w": _number},  # and of several robots, which one
     "estop": {"on": _flag},
     "effect": {"effect": _word, "enabled": _flag, "values": _values},
@@ -85,9 +89,20 @@ COMMANDS: Mapping[str, _Kinds] = {
     "play": {"on": _flag},
     "rate": {"value": _number},
     "run": {"run": _word},
+    "goal": {"x": _number, "y": _number, "yaw": _number},
+    "go": {},
+    "forget_goal": {},
+    "frames": {},
     "initial_pose": {"x": _number, "y": _number, "yaw": _number},
 }
-_OPTIONAL: Mapping[str, _Kinds] = {"drive": {"body": _word}}
+_OPTIONAL: Mapping[str, _Kinds] = {
+    "drive": {"body": _word},
+    "go": {"body": _word},
+    "add": {"to_x": _number, "to_y": _number},  # where a person walks to, and back
+}
+
+
+OPEN = frozenset({"frames"})  # who only looks may give these, too: they change nothing
 
 
 def read(message: str) -> Request | Credential:

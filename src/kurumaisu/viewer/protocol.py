@@ -42,6 +42,7 @@ class Hello:
     session: str | None = None  # only after a token
     report: str | None = None  # address of the critic's report, if there is one
     new_token: str | None = None  # command that prints an address with a token
+    open: tuple[str, ...] = ()  # commands that need no control
     version: int = VERSION
 
 
@@ -103,6 +104,16 @@ class Note:
 
 
 @dataclass(frozen=True)
+class Goal:
+    """Where a robot is to go; body: which one the viewer drove there, driving: and does; text: how that stands."""
+
+    pose: Pose
+    body: str | None = None
+    driving: bool = False
+    text: str = ""
+
+
+@dataclass(frozen=True)
 class PlaybackState:
     """Where a recording is: times [s] by the run's own clock, rate: recorded seconds per second; run: one of runs."""
 
@@ -147,6 +158,7 @@ class State:
     notes: tuple[Note, ...] = ()
     playback: PlaybackState | None = None
     driver: str | None = None  # the input that drives
+    goal: Goal | None = None
 
 
 @dataclass(frozen=True)

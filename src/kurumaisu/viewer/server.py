@@ -17,6 +17,7 @@ from kurumaisu.errors import Error
 from kurumaisu.viewer import access, files, report
 from kurumaisu.viewer.access import AccessTokens
 from kurumaisu.viewer.client import URGENT, Account, Client
+from kurumaisu.viewer.commands import OPEN
 from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.patience import Patience
 from kurumaisu.viewer.seats import Seats
@@ -44,7 +45,7 @@ class Server:
         self._loop = asyncio.new_event_loop()
         self._thread = threading.Thread(target=self._loop.run_forever, name="viewer", daemon=True)
         # An urgent command waits for none that hangs; and one thread for it keeps the order in which they were said.
-        self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in URGENT}
+        self._workers = {name: ThreadPoolExecutor(1, f"viewer_{name}") for name in (*URGENT, *OPEN)}
         self._workers[""] = ThreadPoolExecutor(_WORKERS, "viewer_command")
         self._open: set[Client] = set()
         self._seats = Seats(settings.most_clients)

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a command: words for a person, and a text to be downloaded, if it made one."""
+    """What became of a command: words for a person, and what it made: a text to be downloaded, the id of a body."""
 
     message: str
     result: str | None = None

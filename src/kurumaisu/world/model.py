@@ -168,6 +168,7 @@ class Model:
     ranger_return: below 0 invisible to rangers, else the intensity of a hit; obstacle_return: False: no collisions;
     mass [kg], 0: not given; friction [1], None: not given; update_interval [s].
     device: what a typed model does; None: of a type that only has a body; walk: None: goes nowhere by itself.
+    source: what its file says of it, but name and pose, as any other file can; "": it is in none.
     slope (2,): an addition to Stage's language: rise per metre along x and y of the pose's frame [1], in the outline.
     """
 
@@ -195,3 +196,4 @@ class Model:
     device: Device | None
     walk: Walk | None = None
     slope: FloatArray | None = None
+    source: str = ""

@@ -14,7 +14,7 @@ from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Macros, parse_more
 from kurumaisu.world.tokens import SourceText
 from kurumaisu.world.tree import Builder
-from kurumaisu.world.values import Units
+from kurumaisu.world.values import UNITS, Units, units_of
 
 _MOST_CHARACTERS = 2**20
 
@@ -40,7 +40,8 @@ class Snippet:
 def read_snippet(text: str, vocabulary: Vocabulary) -> Snippet:
     """Read entities of Stage's language, as `pioneer ( name "guest" )`, with the macros of a world.
 
-    Includes and bitmaps are looked for as from the world's own file. Raise Error naming line and column.
+    Its units hold unless the text says unit_length or unit_angle. Includes and bitmaps are looked for as from the
+    world's own file. Raise Error naming line and column.
     """
     if len(text) > _MOST_CHARACTERS:
         raise Error(f"text: is longer than {_MOST_CHARACTERS} characters")
@@ -48,9 +49,12 @@ def read_snippet(text: str, vocabulary: Vocabulary) -> Snippet:
     source = SourceText(top.with_name("text"), text)
     world = parse_more(source, top, vocabulary.macros, notes)
     for given in world.properties.values():
+        if given.name.text in UNITS:
+            continue
         raise given.name.error(f"{given.name.text} would be of the whole world; only models can be added to it")
     catalogue.check(world, notes)
-    models = Builder(vocabulary.units, notes, Shaper(top, vocabulary.image_extents)).build(world)
+    units = units_of(world, notes, vocabulary.units)
+    models = Builder(units, notes, Shaper(top, vocabulary.image_extents)).build(world)
     if not models:
         raise source.error(0, "there is no model in the text")
     return Snippet(models, tuple(notes.texts))

@@ -20,6 +20,7 @@ from kurumaisu.world.shapes import Shaper
 from kurumaisu.world.syntax import Entity
 from kurumaisu.world.values import Units, Values
 from kurumaisu.world.walks import walk
+from kurumaisu.world.writing import model_words
 
 _MOST_MODELS = 100_000  # of a world
 _MOST_ENTITIES = 2_000_000  # models, blocks and sensors of a world
@@ -107,6 +108,7 @@ class Builder:
             "device": device(values),
             "walk": walk(values),
             "slope": _slope(values),
+            "source": model_words(entity, self.units, self.shaper.top),
         }
 
     def _size(self, values: Values) -> FloatArray:

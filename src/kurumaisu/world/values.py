@@ -15,6 +15,9 @@ from kurumaisu.world.tokens import Kind, Token
 
 _LARGEST = 2.0**31  # of a number: what C's int holds
 _PREFIX = re.compile(r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")  # what C's atof takes of a string
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_ANGLES = {"degrees": math.pi / 180, "radians": 1.0}
+UNITS = ("unit_length", "unit_angle")  # properties of a world
 _WHOLE = re.compile(r"\s*[+-]?\d+")
 
 
@@ -101,3 +104,17 @@ class Values:
         if token.kind is Kind.NUMBER or not match or match[0] != token.string:
             self.notes.add(token, f"{given.name.text}: {token.string!r} is read as {value:g}, as Stage does")
         return value
+
+
+def units_of(top: Entity, notes: Notes, known: Units) -> Units:
+    """Return the units that a world's entity says; known: what holds where it says nothing."""
+    said = Values(top, known, notes)
+    if said.whole("test", 0):
+        raise said.error("test", "this is a test file, which Stage refuses to run")
+    chosen = []
+    for name, units, otherwise in zip(UNITS, (_LENGTHS, _ANGLES), (known.length, known.angle), strict=True):
+        word = said.text(name, "")
+        if said.has(name) and word not in units:
+            notes.add(top.properties[name].name, f"{name} must be one of {', '.join(units)}, not {word!r}")
+        chosen.append(units.get(word, otherwise))
+    return Units(*chosen)

@@ -22,7 +22,8 @@ from kurumaisu.world.snippet import Vocabulary
 from kurumaisu.world.syntax import NO_MACROS, Entity, Property, parse
 from kurumaisu.world.tokens import Kind, SourceText, Token
 from kurumaisu.world.tree import Builder, global_poses
-from kurumaisu.world.values import Units, Values
+from kurumaisu.world.values import Units, Values, units_of
+from kurumaisu.world.writing import Setting, world_words
 
 _RESOLUTION = 0.02  # [m], as in Stage
 _INTERVAL = 100.0  # [ms], as in Stage
@@ -31,8 +32,6 @@ _FINEST = 1e-5  # [m]
 _SHORTEST = 1e-3  # [ms]
 _WALL_HEIGHT = 2.5  # [m] of a map's walls if nothing says how high they are: that of a room
 _SEMANTICS = ("stage", "physical")
-_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_ANGLES = {"degrees": np.pi / 180, "radians": 1.0}
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,8 @@ class World:
     models: in depth-first file order; poses: (n, 4), their global start poses x, y, z [m], heading [rad];
     resolution: edge of Stage's cells [m]; interval: of a step [s]; quit_time [s], 0: never; speedup: of the clock,
     0 or less: as fast as possible; semantics: how the file wants to be simulated, stage or physical, an addition to
-    Stage's language; vocabulary: what more text can be read with.
+    Stage's language; vocabulary: what more text can be read with; setting: what a file of the same world
+    says first.
     For a chair alone: segments: (m, 4), x and y of both ends of all that a laser sees [m]; obstacles: (n, 4), all
     that a chair bumps into, at any height, in both without what drives or walks; starts: those, in file order;
     bounds: smallest x, smallest y, largest x, largest y [m] of the walls.
@@ -68,6 +68,7 @@ class World:
     speedup: float
     semantics: str
     vocabulary: Vocabulary
+    setting: Setting
     segments: FloatArray
     obstacles: FloatArray
     starts: tuple[Start, ...]
@@ -110,7 +111,7 @@ def load_world(path: Path, *, image_extents: bool = False, values: Mapping[str, 
         top, macros, image_extents = _map_alone(path), NO_MACROS, True
     else:
         top, macros = parse(path, values or {}, notes)
-    said = Values(top, _units(top, notes), notes)
+    said = Values(top, units_of(top, notes, Units()), notes)
     catalogue.check(top, notes)
     models = Builder(said.units, notes, Shaper(path, image_extents)).build(top)
     return _world(path, models, said, Vocabulary(path, macros, said.units, image_extents))
@@ -131,19 +132,6 @@ def _map_alone(path: Path) -> Entity:
     ):
         model.properties[name] = given(name, kind, *texts)
     return Entity("world", Token(Kind.WORD, "world", source, 0), children=[model])
-
-
-def _units(top: Entity, notes: Notes) -> Units:
-    said = Values(top, Units(), notes)
-    if said.whole("test", 0):
-        raise said.error("test", "this is a test file, which Stage refuses to run")
-    chosen = []
-    for name, units in (("unit_length", _LENGTHS), ("unit_angle", _ANGLES)):
-        word = said.text(name, next(iter(units)))
-        if word not in units:
-            notes.add(top.properties[name].name, f"{name} must be one of {', '.join(units)}, not {word!r}")
-        chosen.append(units.get(word, next(iter(units.values()))))
-    return Units(*chosen)
 
 
 def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Vocabulary) -> World:
@@ -168,6 +156,7 @@ def _world(path: Path, models: tuple[Model, ...], said: Values, vocabulary: Voca
         speedup=said.number("speedup", 1.0),
         semantics=_semantics(said),
         vocabulary=vocabulary,
+        setting=Setting(world_words(said.entity, path), vocabulary.image_extents),
         segments=_outlines([model for model in walls if model.ranger_return >= 0], poses),
         obstacles=_outlines([model for model in walls if model.obstacle_return], poses),
         starts=tuple(Start(m.name or "chair", poses[m.index, PLANAR]) for m in starts),

@@ -29,6 +29,8 @@ from kurumaisu.ros.view.fans import ChairFan
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.chair.holder import VoltageHolder
 from kurumaisu.sim.chair.simulator import ChairSimulator, Observation
+from kurumaisu.sim.robots.newcomers import newcomers
+from kurumaisu.sim.robots.saved_world import Scene
 from kurumaisu.types import FloatArray
 
 _HELP = """
@@ -50,6 +52,9 @@ services:
   reset, seed         back to the start, with the same or another seed
   pause, step, speed  pause, advance one step, run faster or slower
   set_pose            move a model
+  spawn, delete       add a model, or take one away
+  restore             bring back what was taken away
+  save_world          the world as it is now, as the text of a world file
   save, load          the whole state, to a file and back
 parameters:
   launch/sim_node.yaml, and the arguments of launch/sim.launch
@@ -151,6 +156,29 @@ class SimNode:
         self._simulator.set_pose(name, pose)
         if (self._simulator.chair_pose != before).any():
             self._view.carried()
+
+    def spawn(self, like: str, name: str, pose: FloatArray) -> str:
+        """Add a copy of a model, or what a text describes, at a pose (4,); return `#` and its key.
+
+        Raise Error for an unknown model, a text that makes no sense, a robot, and if the chair is in the way.
+        """
+        there = self._simulator.machinery.population
+        new = newcomers(like, name, there.models, there.index, self._settings.world.vocabulary)
+        for warning in new.warnings:
+            rospy.logwarn(f"SIM_WORLD_IGNORED {warning}")
+        return self._simulator.spawn(new.models, pose)
+
+    def delete(self, name: str) -> None:
+        """Take a model with all that stands on it away. Raise Error for an unknown one, and for a robot."""
+        self._simulator.delete(name)
+
+    def restore(self, name: str) -> None:
+        """Bring back what was deleted. Raise Error if it cannot be."""
+        self._simulator.restore(name)
+
+    def scene(self) -> Scene:
+        """Return what there is now."""
+        return Scene(self._settings.world.setting, self._simulator.models, self._simulator.model_poses)
 
     def save(self) -> bytes:
         """Return the state of all but the voltages that are yet to come."""

@@ -43,6 +43,8 @@ services:
   ~reset, ~seed               the same, with the same or another seed
   ~pause, ~step, ~speed       pause, advance one step, change the speed
   ~set_pose, ~spawn, ~delete  move a model, add one, remove one
+  ~restore                    bring back one that was removed
+  ~save_world                 the world as it is now, as the text of a file
   ~save, ~load                the whole state, to a file and back
 parameters:
   launch/stageros.yaml, which the node reads itself

@@ -8,11 +8,9 @@ from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from kurumaisu.ros.pacing import Pacer
 from kurumaisu.ros.requests import Requests
-from kurumaisu.ros.rotation import pose_of
 from kurumaisu.ros.services import Services
 from kurumaisu.ros.stageros.session import Session
 from kurumaisu.sim.robots.state_folder import StateFolder
-from kurumaisu.srv import Delete, DeleteRequest, Spawn, SpawnRequest
 
 
 class StagerosServices(Services):
@@ -23,19 +21,11 @@ class StagerosServices(Services):
         self._session = session
         self._services += [
             rospy.Service("reset_positions", Empty, self._reset_positions),
-            rospy.Service("~spawn", Spawn, self._spawn),
-            rospy.Service("~delete", Delete, self._delete),
         ]
 
     def _reset_positions(self, _request: EmptyRequest) -> EmptyResponse:
         self._requests.ask(self._session.reset_positions)
         return EmptyResponse()
-
-    def _spawn(self, request: SpawnRequest) -> tuple[bool, str]:
-        return self._outcome(lambda: self._session.spawn(request.like, request.name, pose_of(request.pose)))
-
-    def _delete(self, request: DeleteRequest) -> tuple[bool, str]:
-        return self._outcome(lambda: self._session.delete(request.name))
 
     def _done(self) -> str:
         return f"{super()._done()}, {self._session.heard} commands heard"

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,7 +15,6 @@ from kurumaisu.errors import Error, told
 from kurumaisu.names import hint
 from kurumaisu.ros.inbox import Rates, rates_of
 from kurumaisu.ros.rotation import pose_of
-from kurumaisu.ros.stageros.added_models import is_text, renumbered
 from kurumaisu.ros.stageros.names import Names, names_of, names_of_another
 from kurumaisu.ros.stageros.plan import plan_world
 from kurumaisu.ros.stageros.publish import Publisher
@@ -26,9 +24,11 @@ from kurumaisu.ros.stageros.settings import StagerosSettings
 from kurumaisu.ros.view.fans import FleetFans
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.motion.partition import is_robot
+from kurumaisu.sim.robots.newcomers import newcomers
+from kurumaisu.sim.robots.saved_world import Scene
 from kurumaisu.sim.robots.simulator import Simulator
 from kurumaisu.types import FloatArray
-from kurumaisu.world import World, read_snippet
+from kurumaisu.world import World
 from kurumaisu.world.layout import family
 from kurumaisu.world.model import Model
 
@@ -43,7 +43,7 @@ class Session:
         self.paused = False
         settings = replace(settings, options=settings.options.of_world(world.semantics))
         self._settings = settings
-        self._vocabulary = world.vocabulary
+        self._vocabulary, self._setting = world.vocabulary, world.setting
         self._use_model_names = use_model_names
         self._seed = settings.seed
         self._simulator = Simulator(world, settings.options)
@@ -55,6 +55,7 @@ class Session:
         self._carried: deque[tuple[Names, FloatArray]] = deque()
         self._home = names_of(world.models, settings, use_model_names)
         self._numbered = len(self._home)  # robots that there have ever been
+        self._left: dict[int, Names] = {}  # names of deleted robots, by their keys
         self._publisher = Publisher(settings, world.interval, self._ears)
         self._take(self._home)
         self._publisher.check_rates()
@@ -130,6 +131,7 @@ class Session:
         self._seed = self._seed if seed is None else seed
         self._simulator.reset(self._seed)
         self._view.carried()
+        self._left = {}
         self._take(self._home)
 
     def reset_positions(self) -> None:
@@ -144,27 +146,43 @@ class Session:
         if is_robot(model):
             self._view.carried()
 
-    def spawn(self, like: str, name: str, pose: FloatArray) -> None:
+    def spawn(self, like: str, name: str, pose: FloatArray) -> str:
         """Add a copy of a model with all that stands on it, or what a text in the world's words describes.
 
-        Raise Error for an unknown model, a text that makes no sense, or a name that is taken.
+        Return `#` and its key. Raise Error for an unknown model, a text that makes no sense, or a name that is taken.
         """
-        models = self._described(like) if is_text(like) else self._with_all_on_it(like)
-        models = renumbered(models, name or (models[0].name if is_text(like) else None))
-        taken = {model.name for model in self._simulator.models} & {model.name for model in models if model.name}
-        if models[0].name in taken:
-            raise Error(f"name {models[0].name!r}: there is a model of this name")
-        before = set(self._rows)
-        self._simulator.spawn(models, pose)
-        names = sorted(before, key=self._rows.__getitem__)
-        self._take([*names, *self._names_of_more(self._simulator.robots[len(names) :])])
+        new = newcomers(like, name, self._simulator.models, lambda one: self._model(one).index, self._vocabulary)
+        for warning in new.warnings:
+            rospy.logwarn(f"STAGEROS_WORLD {warning}")
+        key = self._simulator.spawn(new.models, pose)
+        self._take_more()
+        return key
 
     def delete(self, name: str) -> None:
         """Take a model with all that stands on it away. Raise Error for an unknown one."""
-        gone = {model.index for model in self._with_all_on_it(name)}
-        stay = [names for names, row in self._rows.items() if self._simulator.robots[row].index not in gone]
-        self._simulator.delete(self._model(name))
+        model, keys = self._model(name), self._simulator.machinery.robot_keys.tolist()
+        gone = set(family(self._simulator.models, model.index))
+        going = {names for names, row in self._rows.items() if self._simulator.robots[row].index in gone}
+        self._left |= {keys[self._rows[names]]: names for names in going}
+        stay = [names for names in self._rows if names not in going]
+        self._simulator.delete(model)
         self._take(stay)
+
+    def restore(self, name: str) -> None:
+        """Bring back what was deleted, robots under their old names. Raise Error if it cannot be."""
+        self._simulator.restore(name)
+        self._take_more()
+
+    def _take_more(self) -> None:
+        """Publish the robots that have come as well; they are the last."""
+        names = sorted(self._rows, key=self._rows.__getitem__)
+        more = slice(len(names), None)
+        keys = self._simulator.machinery.robot_keys.tolist()[more]
+        self._take([*names, *self._names_of_more(self._simulator.robots[more], keys)])
+
+    def scene(self) -> Scene:
+        """Return what there is now."""
+        return Scene(self._setting, self._simulator.models, self._simulator.model_poses)
 
     def save(self) -> bytes:
         """Return the whole state, with the names that the robots have here."""
@@ -183,17 +201,8 @@ class Session:
         self._seed = self._simulator.seed
         switches = self._settings.strip_leading_slash, self._settings.relative_topics
         self._numbered = max(self._numbered, numbered)
+        self._left = {}
         self._take([Names(prefix, *switches) for prefix in prefixes])
-
-    def _described(self, text: str) -> Sequence[Model]:
-        snippet = read_snippet(text, self._vocabulary)
-        for warning in snippet.warnings:
-            rospy.logwarn(f"STAGEROS_WORLD {warning}")
-        return snippet.models
-
-    def _with_all_on_it(self, name: str) -> Sequence[Model]:
-        models = self._simulator.models
-        return [models[index] for index in family(models, self._model(name).index)]
 
     def _model_poses(self) -> FloatArray:
         return self._simulator.model_poses
@@ -205,12 +214,16 @@ class Session:
         models = self._simulator.models
         self._publisher.change(models, plan_world(models, names, self._settings))
 
-    def _names_of_more(self, robots: tuple[Model, ...]) -> list[Names]:
-        first = self._numbered
-        self._numbered += len(robots)
-        return [
-            names_of_another(first + i, robot, self._settings, self._use_model_names) for i, robot in enumerate(robots)
-        ]
+    def _names_of_more(self, robots: tuple[Model, ...], keys: list[int]) -> list[Names]:
+        """Return the names of robots that have come: those that they had before, or new ones."""
+        every: list[Names] = []
+        for robot, key in zip(robots, keys, strict=True):
+            names = self._left.pop(key, None)
+            if names is None:
+                names = names_of_another(self._numbered, robot, self._settings, self._use_model_names)
+                self._numbered += 1
+            every.append(names)
+        return every
 
     def _model(self, name: str | Names) -> Model:
         """Return the model of a name in the world file, of # and its key, or a robot's by its topics', as robot_1."""

@@ -26,8 +26,6 @@ from kurumaisu.viewer.hub import Hub
 from kurumaisu.viewer.protocol import Group, Value
 from kurumaisu.viewer.source import Outcome
 
-ABILITIES = frozenset({"effect", "save_model"})
-
 
 class EffectSwitches:
     """Shows what acts in the hub, and changes it."""

@@ -13,7 +13,7 @@ from geometry_msgs.msg import PoseArray, PoseWithCovarianceStamped
 from nav_msgs.msg import OccupancyGrid
 from PIL import Image
 
-from kurumaisu.geometry import compose
+from kurumaisu.geometry import between, compose
 from kurumaisu.map_file import FREE_BELOW, OCCUPIED_ABOVE
 from kurumaisu.ros.inbox import check_covariance
 from kurumaisu.ros.maps.messages import map_of
@@ -41,10 +41,12 @@ class Maps:
         self._topics = (self._map, self._cloud, self._pose)
         self._alignment = Alignment()
         self._drawn = 0.0  # [s] when the last picture was
+        self._offset = np.zeros(3)  # of the map in the world that is shown
 
     def open(self) -> None:
         """Listen."""
         self._alignment.begin()
+        self._offset = np.zeros(3)
         for topic in self._topics:
             topic.open()
 
@@ -76,12 +78,17 @@ class Maps:
         else:
             laid, offset = pose, np.zeros(3)
         assert offset is not None
+        self._offset = offset
         self._show(offset)
         x, y, yaw = laid.tolist()
         if not known:
             return Estimate((x, y, yaw), None)
         c = self._pose.last.pose.covariance
         return Estimate((x, y, yaw), (float(c[0]), float(c[1]), float(c[7]), float(c[35])))
+
+    def in_map(self, pose: FloatArray) -> FloatArray:
+        """Return a pose (3,) of the world that is shown in the frame of the map."""
+        return between(self._offset, pose)
 
     def _show(self, offset: FloatArray) -> None:
         if (raw := self._cloud.take_raw()) is not None:

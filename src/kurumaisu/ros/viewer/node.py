@@ -26,9 +26,10 @@ subscribes to:
   odom, voltages, cmd_vel_out, active_input, diagnostics
   map, particlecloud, amcl_pose      of mapping or localization
   /rosout                            warnings
+  tf, tf_static                      when a page lists the frames
 publishes, if the page may command:
   viewer_vel                         commands for base_node; stageros: cmd_vel
-  initialpose
+  initialpose, move_base_simple/goal
 services:
   ~new_token                         a new address, which allows commands
   ~clients                           the pages that are open

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from kurumaisu._core import frame_of
+from kurumaisu.driving import Manner
 from kurumaisu.settings import Section
 from kurumaisu.viewer.settings import ViewerSettings
 from kurumaisu.viewer.settings import read_settings as read_server
@@ -36,6 +37,7 @@ class NodeSettings:
     base: str  # name of the base controller, or none
     model: Path
     driving: Driving
+    manner: Manner
     bags: Path
     notes: float
     frames: tuple[str, str, str]  # map, odom, base
@@ -44,7 +46,7 @@ class NodeSettings:
 def read_settings(values: Any, where: str) -> NodeSettings:
     """Return the settings of a parameter tree. Raise Error naming the key for anything wrong."""
     top = Section(values, where)
-    driving = top.section("drive")
+    driving, goal = top.section("drive"), top.section("goal")
     settings = NodeSettings(
         server=read_server(top),
         control=top.flag("control"),
@@ -58,10 +60,12 @@ def read_settings(values: Any, where: str) -> NodeSettings:
             v=driving.number("v", above=0),
             w=driving.number("w", above=0),
         ),
+        manner=Manner(**{name: goal.number(name, above=0) for name in ("gain", "reach", "aim", "patience")}),
         bags=Path(top.text("bags")),
         notes=top.number("notes", above=0),
         frames=(frame_of(top.text("map_frame")), frame_of(top.text("odom_frame")), frame_of(top.text("base_frame"))),
     )
     driving.end()
+    goal.end()
     top.end()
     return settings

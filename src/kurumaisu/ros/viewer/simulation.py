@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -18,13 +19,14 @@ from kurumaisu.msg import View
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.viewer.calls import call, done
 from kurumaisu.ros.viewer.topics import Newest
-from kurumaisu.srv import Seed, SetPose, Speed
+from kurumaisu.srv import Delete, SaveWorld, Seed, SetPose, Spawn, Speed
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer.hub import Hub
+from kurumaisu.viewer.palette import Walk, described
 from kurumaisu.viewer.protocol import Body, Fan, Ranger, World
 from kurumaisu.viewer.source import Outcome
 
-ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose"})
+ABILITIES = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose", "add", "delete", "restore", "save_world"})
 
 
 class SimulationSource:
@@ -40,6 +42,7 @@ class SimulationSource:
         self.run = -1  # goes up when a robot was put elsewhere
         self.odometry: FloatArray | None = None  # (3,) of the first robot, in its own frame; None: it is told its pose
         self._known: dict[str, Any] = {}  # of the last view
+        self._added: dict[str, str] = {}  # names by ids, also of what is yet to be described, or may come back
 
     def open(self) -> None:
         """Listen."""
@@ -81,34 +84,72 @@ class SimulationSource:
 
     def command(self, name: str, arguments: dict[str, Any]) -> Outcome:
         """Obey. Raise Error with the reason where it cannot be."""
-        front = self._services
-        match name:
-            case "pause":
-                return Outcome(done(f"{front}pause", SetBool, arguments["on"]))
-            case "step":
-                return Outcome(done(f"{front}step", Trigger))
-            case "speed":
-                return Outcome(done(f"{front}speed", Speed, arguments["value"]))
-            case "seed":
-                return Outcome(done(f"{front}seed", Seed, arguments["value"]))
-            case "reset":
-                call(f"{front}reset", Empty)
-                return Outcome("back at the start")
-            case "set_pose":
-                return Outcome(self._put(**arguments))
-        raise Error(f"{name}: is not possible in a simulation")
+        if name not in ABILITIES:
+            raise Error(f"{name}: is not possible in a simulation")
+        outcome: Outcome = getattr(self, f"_do_{name}")(**arguments)
+        return outcome
 
-    def _put(self, body: str, x: float, y: float, yaw: float) -> str:
-        known = {one["id"]: one for one in self._world.get("bodies", [])}
-        if body not in known:
-            raise Error(f"set_pose: there is no body {body!r}")
-        if not known[body]["movable"]:
-            raise Error(f"set_pose: {known[body]['name']} is a wall, which cannot be moved")
-        pose = Pose(Point(x, y, known[body]["z"]), quaternion_of(yaw))
+    def _do_pause(self, on: bool) -> Outcome:
+        return Outcome(done(f"{self._services}pause", SetBool, on))
+
+    def _do_step(self) -> Outcome:
+        return Outcome(done(f"{self._services}step", Trigger))
+
+    def _do_speed(self, value: float) -> Outcome:
+        return Outcome(done(f"{self._services}speed", Speed, value))
+
+    def _do_seed(self, value: int) -> Outcome:
+        return Outcome(done(f"{self._services}seed", Seed, value))
+
+    def _do_reset(self) -> Outcome:
+        call(f"{self._services}reset", Empty)
+        return Outcome("back at the start")
+
+    def _do_save_world(self) -> Outcome:
+        answer = call(f"{self._services}save_world", SaveWorld)
+        if not answer.success:
+            raise Error(answer.message)
+        return Outcome(str(answer.message), str(answer.world))
+
+    def _do_delete(self, body: str) -> Outcome:
+        return Outcome(self._done_to(self._known_body("delete", body), "delete", Delete))
+
+    def _do_restore(self, body: str) -> Outcome:
+        return Outcome(done(f"{self._services}restore", Delete, body))
+
+    def _do_set_pose(self, body: str, x: float, y: float, yaw: float) -> Outcome:
+        known = self._known_body("set_pose", body)
+        return Outcome(self._done_to(known, "set_pose", SetPose, Pose(Point(x, y, known["z"]), quaternion_of(yaw))))
+
+    def _do_add(self, kind: str, x: float, y: float, yaw: float, length: float, width: float, **to: float) -> Outcome:
+        """Add a box, a wall or a person, who walks if it is said to where."""
+        if len(to) == 1:
+            raise Error("add: to_x and to_y belong together")
+        walk = Walk((x, y), (to["to_x"], to["to_y"])) if to else None
+        taken = {body["name"] for body in self._world.get("bodies", [])} | set(self._added.values())
+        name = next(name for number in count(1) if (name := f"{kind} {number}") not in taken)
+        text = described(kind, name, length, width, walk)
+        answer = call(f"{self._services}spawn", Spawn, text, "", Pose(Point(x, y, 0.0), quaternion_of(yaw)))
+        if not answer.success:
+            raise Error(f"{name}: {answer.message}")
+        self._added[answer.id] = name
+        return Outcome(f"{name} was added", answer.id)
+
+    def _known_body(self, command: str, body: str) -> dict[str, Any]:
+        """Return what is known of a body. Raise Error for none, and for a wall."""
+        known: dict[str, dict[str, Any]] = {one["id"]: one for one in self._world.get("bodies", [])}
+        if body not in known and body not in self._added:
+            raise Error(f"{command}: there is no body {body!r}")
+        found = known.get(body, {"id": body, "name": self._added.get(body), "movable": True, "z": 0.0})
+        if not found["movable"]:
+            raise Error(f"{command}: {found['name']} is a wall, which stays where it is")
+        return found
+
+    def _done_to(self, body: dict[str, Any], service: str, kind: type, *more: Any) -> str:
         try:
-            return done(f"{self._services}set_pose", SetPose, body, pose)
+            return done(f"{self._services}{service}", kind, body["id"], *more)
         except Error as error:  # the simulator says the id that it was told, which a person has never seen
-            raise Error(str(error).replace(body, known[body]["name"], 1)) from error
+            raise Error(str(error).replace(body["id"], body["name"], 1)) from error
 
     def _show(self, world: dict[str, Any]) -> None:
         self._world = world

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,9 +15,11 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model
 from kurumaisu.ros.rotation import quaternion_of
-from kurumaisu.ros.viewer import effects, simulation
+from kurumaisu.ros.viewer import simulation
 from kurumaisu.ros.viewer.chair import Chair
 from kurumaisu.ros.viewer.effects import EffectSwitches
+from kurumaisu.ros.viewer.frames import Frames
+from kurumaisu.ros.viewer.goal import DrivenGoals, Goals
 from kurumaisu.ros.viewer.maps import Maps
 from kurumaisu.ros.viewer.notes import RosoutNotes
 from kurumaisu.ros.viewer.record import BagRecorder
@@ -61,14 +63,23 @@ class RosSource:
         driving = settings.driving
         self.limits: Mapping[str, float] | None = None
         self._initial: Any = None
+        self._goals: Goals | None = None
         if settings.control:
+            self._goals = Goals(settings.frames[0])
             hub.new_token = f"rosservice call {rospy.get_name()}/new_token"
             self._initial = rospy.Publisher("initialpose", PoseWithCovarianceStamped, queue_size=1)
         if settings.control and driving.topic != NONE:
             self._sticks = Sticks(driving, self._scene.drives)
             self.limits = {"v": driving.v, "w": driving.w}
+            if isinstance(
+                self._scene, SimulationSource
+            ):  # a real robot has somebody in it, and walls that nobody knows
+                self._goals = DrivenGoals(settings.frames[0], settings.manner, driving, self._sticks)
         self._map_frame, _, self._base_frame = settings.frames
-        self.abilities = self._can()
+        self._does = self._own_commands()
+        self.abilities = frozenset(self._does)
+        if isinstance(self._scene, SimulationSource):
+            self.abilities |= simulation.ABILITIES
         self._watched = threading.Event()
         self._open = False
         self._shown: Any = None  # of the scene, last
@@ -79,6 +90,8 @@ class RosSource:
             self._watched.set()
         else:
             self._watched.clear()
+            if self._goals is not None:
+                self._goals.stop("ended: nobody looked")
             if self._sticks is not None:
                 self._sticks.rest()
 
@@ -101,34 +114,48 @@ class RosSource:
 
     def command(self, name: str, arguments: Mapping[str, Any]) -> Outcome:
         """Obey. Raise Error where it cannot be done."""
-        match name:
-            case "drive" if self._sticks is not None:
-                return self._sticks.drive(**arguments)
-            case "estop" if self._chair is not None:
-                return self._chair.estop(**arguments)
-            case "effect" if self._effects is not None:
-                return self._effects.switch(**arguments)
-            case "save_model" if self._effects is not None:
-                return self._effects.model()
-            case "record":
-                return self._bags.record(**arguments)
-            case "initial_pose" if self._initial is not None:
-                return self._guess(**arguments)
-            case _ if isinstance(self._scene, SimulationSource):
-                return self._scene.command(name, dict(arguments))
+        if name in self._does:
+            return self._does[name](**arguments)
+        if isinstance(self._scene, SimulationSource):
+            return self._scene.command(name, dict(arguments))
         raise Error(f"{name}: cannot be done here")
 
-    def _can(self) -> frozenset[str]:
-        able = {"record", "initial_pose"}
+    def _own_commands(self) -> dict[str, Callable[..., Outcome]]:
+        """Return what obeys each command that is not the scene's."""
+        does: dict[str, Callable[..., Outcome]] = {"record": self._bags.record, "frames": Frames().list}
+        if self._initial is not None:
+            does["initial_pose"] = self._guess
+        if self._goals is not None:
+            does |= {"goal": self._aim, "forget_goal": self._goals.forget}
+        if isinstance(self._goals, DrivenGoals):
+            does["go"] = self._go
         if self._sticks is not None:
-            able.add("drive")
+            does["drive"] = self._drive
         if self._chair is not None:
-            able.add("estop")
-        if isinstance(self._scene, SimulationSource):
-            able |= simulation.ABILITIES
+            does["estop"] = self._chair.estop
         if self._effects is not None:
-            able |= effects.ABILITIES
-        return frozenset(able)
+            does |= {"effect": self._effects.switch, "save_model": self._effects.model}
+        return does
+
+    def _drive(self, v: float, w: float, body: str | None = None) -> Outcome:
+        assert self._sticks is not None
+        if isinstance(self._goals, DrivenGoals):
+            self._goals.by_hand(body)
+        return self._sticks.drive(v, w, body)
+
+    def _aim(self, x: float, y: float, yaw: float) -> Outcome:
+        """Tell of a goal."""
+        assert self._goals is not None
+        pose = np.array([x, y, yaw])
+        return self._goals.publish(pose, self._maps.in_map(pose), self._heard("goal"))
+
+    def _go(self, body: str | None = None) -> Outcome:
+        """Let a body drive to the goal, None: the first one. Raise Error if there is none."""
+        assert isinstance(self._goals, DrivenGoals)
+        found = next(iter(self._scene.drives()), None) if body is None else body
+        if found is None:
+            raise Error("go: there is no robot that can be driven")
+        return self._goals.drive(found, self._scene.run)
 
     def _turn(self, on: bool) -> None:
         """Listen, or no longer."""
@@ -150,10 +177,12 @@ class RosSource:
             self._transforms.listen(self._maps.there)  # flat out, a simulator sends thousands a second
         if parts is self._shown and self._chair is None:
             return  # nothing is new
-        self._shown = parts
+        new, self._shown = parts is not self._shown, parts
         truth = None if parts.get("truth") is None else np.array(parts["truth"])
         odom = self._odom(truth)
         chair = {} if self._chair is None else self._chair.parts()
+        if new and isinstance(self._goals, DrivenGoals):
+            self._goals.moment(parts, self._scene.run, bool(chair.get("estop")))
         state = State(
             **parts,
             **chair,
@@ -163,6 +192,7 @@ class RosSource:
             recording=self._bags.recording,
             starting=self._bags.starting,
             notes=self._notes.now(),
+            goal=None if self._goals is None else self._goals.shown(),
         )
         self._hub.state(state, scans)
 
@@ -179,12 +209,17 @@ class RosSource:
             return self._start.laid(pose, pose if truth is None else truth)
         return self._start.laid(pose, truth)
 
+    def _heard(self, command: str) -> float:
+        """Return the time of the last moment [s]. Raise Error before the first."""
+        if self._shown is None:
+            raise Error(f"{command}: no robot has been heard yet")
+        return float(self._shown["t"])
+
     def _guess(self, x: float, y: float, yaw: float) -> Outcome:
         """Tell whoever localises where the robot is."""
-        if self._shown is None:
-            raise Error("initial_pose: no robot has been heard yet")
         message = PoseWithCovarianceStamped()
-        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(self._shown["t"]), self._map_frame
+        message.header.stamp = rospy.Time.from_sec(self._heard("initial_pose"))
+        message.header.frame_id = self._map_frame
         message.pose.pose.position.x, message.pose.pose.position.y = x, y
         message.pose.pose.orientation = quaternion_of(yaw)
         for place, variance in ((0, 0.25), (7, 0.25), (35, 0.07)):  # [m^2, rad^2] as rviz has them

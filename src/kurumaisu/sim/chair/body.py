@@ -82,6 +82,7 @@ def _chair(world: World, first: Model | None, index: int, pose: FloatArray, chas
         hinge=None,
         device=_base(),
         walk=None,
+        source="" if first is None else first.source,
     )
 
 

@@ -128,9 +128,34 @@ class ChairSimulator:
         """
         before = self._world.machinery
         self._world.set_pose(name, np.asarray(pose, dtype=np.float64))
-        self._scanner.sight.restart()
         if self._world.machinery is not before:
-            self._power_up()
+            self._others_changed()
+        else:
+            self._scanner.sight.restart()
+
+    def spawn(self, models: Sequence[WorldModel], pose: FloatArray | Sequence[float]) -> str:
+        """Add a model with all that stands on it, numbered from 0, parents first, at a pose (4,) in the map.
+
+        Return what it can be called by: `#` and its key. Raise Error, with nothing changed, for a robot, for a pose
+        that makes no sense, and if the chair is in the way.
+        """
+        key = self._world.spawn(models, np.asarray(pose, dtype=np.float64), self._steps)
+        self._others_changed()
+        return key
+
+    def delete(self, name: str) -> None:
+        """Take a model away, with all that stands on it. Raise Error for an unknown one, and for a robot."""
+        self._world.delete(name)
+        self._others_changed()
+
+    def restore(self, name: str) -> None:
+        """Bring a model back that was deleted, by its name or `#` and key. Raise Error if it cannot be."""
+        self._world.restore_model(name, self._steps)
+        self._others_changed()
+
+    def _others_changed(self) -> None:
+        self._scanner.sight.restart()
+        self._power_up()
 
     def save(self) -> bytes:
         """Return the whole state, from which load continues bit for bit."""

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -14,11 +14,11 @@ from kurumaisu.geometry import PLANAR, attached, between, relative
 from kurumaisu.params import Chassis
 from kurumaisu.sim.chair.body import Scene, outline
 from kurumaisu.sim.motion.following import Followed
-from kurumaisu.sim.motion.partition import Distort
+from kurumaisu.sim.motion.partition import Distort, is_robot
 from kurumaisu.sim.options import OdometryWalk, Options
 from kurumaisu.sim.robots import snapshot
 from kurumaisu.sim.robots.machinery import Machinery
-from kurumaisu.sim.robots.model_changes import checked_pose, moved
+from kurumaisu.sim.robots.model_changes import checked_pose, moved, rebuilt, with_newcomers, without
 from kurumaisu.sim.robots.population import Population
 from kurumaisu.sim.robots.touch import touched
 from kurumaisu.sim.settings import Dynamics
@@ -109,6 +109,40 @@ class ChairWorld:
                 place = f"x {x:.3f} m, y {y:.3f} m, {math.degrees(heading):.1f} deg"
                 raise Error(f"{name}: does not fit at {place}; in the way: {why}")
             self.pose = self.machinery.frames[self.body, PLANAR]
+
+    def spawn(self, models: Sequence[Model], pose: FloatArray, step: int) -> str:
+        """Add a tree of models, parents first, the first one at a pose (4,); return `#` and its key.
+
+        Raise Error, with nothing changed, for a robot, and if the chair is in the way.
+        """
+        if any(is_robot(model) for model in models):
+            raise Error(f"{models[0].name or models[0].type}: a robot cannot come to a world that runs")
+        before = self.machinery.population
+        self._go_on_with(with_newcomers(before, models, checked_pose(pose), step))
+        return f"#{before.fresh}"
+
+    def delete(self, name: str) -> None:
+        """Take a model with all that stands on it away. Raise Error, with nothing changed, for a robot."""
+        machinery = self.machinery
+        index = machinery.population.index(name)
+        if any(is_robot(machinery.population.models[i]) for i in machinery.population.with_descendants(index)):
+            raise Error(f"{name}: a robot cannot leave a world that runs")
+        self._go_on_with(without(machinery, index).population)
+
+    def restore_model(self, name: str, step: int) -> None:
+        """Bring back what was deleted. Raise Error, with nothing changed, if it cannot be."""
+        self._go_on_with(self.machinery.population.restored(name, step))
+
+    def _go_on_with(self, population: Population) -> None:
+        before = self.machinery
+        after = rebuilt(before, population)
+        if self._distort is not None and len(after.walls.faces) != len(before.walls.faces):
+            raise Error("world.map_error acts, and would move all walls anew: switch it off first")
+        self._have(after)
+        if self.overlaps():
+            why = ", ".join(self._in_the_way())
+            self._have(before)
+            raise Error(f"the chair is in the way: it would overlap {why}")
 
     def overlaps(self) -> bool:
         """Return whether the chair touches something solid, or something solid is inside of it."""

@@ -37,6 +37,15 @@ def with_newcomers(population: Population, models: Sequence[Model], pose: FloatA
     return population.joined(models, attached(pose, relative(places[0], places)), step)
 
 
+def without(old: Machinery, index: int) -> Machinery:
+    """Return machinery without a model and all that stand on it, which may come back."""
+    bodies, now = old.bodies, old.model_poses()
+    if index not in bodies.heads:  # a part of a body, of which only where it is in that body counts
+        parts = bodies.body_of == bodies.body_of[index]
+        now[parts] = old.population.poses[parts]
+    return rebuilt(old, old.population.without(index, now))
+
+
 def moved(old: Machinery, index: int, pose: FloatArray) -> Machinery:
     """Return the machinery, new or not, in which a model, with all that stands on it, is at a pose (4,) in the map."""
     now = old.model_poses()

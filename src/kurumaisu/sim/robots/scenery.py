@@ -83,6 +83,8 @@ def _piece(machinery: Machinery, head: int, members: list[int], row: int) -> Pie
         model, row, max(float(extent), float(np.ptp(model.shape.heights)) if len(model.shape.heights) else 0.0)
     )
     key = int(population.keys[head])
+    if kind == "wall" and key >= population.home and polygons:
+        kind = "obstacle"  # who has added it may take it away again
     return Piece(
         id=f"#{key}",
         name=model.name or f"{model.type} {key}",

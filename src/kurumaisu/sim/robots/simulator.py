@@ -21,7 +21,15 @@ from kurumaisu.sim.robots.devices import Value
 from kurumaisu.sim.robots.drive import without_nonsense
 from kurumaisu.sim.robots.fleet_effects import check_names
 from kurumaisu.sim.robots.machinery import Machinery
-from kurumaisu.sim.robots.model_changes import checked_pose, moved, rebuilt, same_fans, stuck, with_newcomers
+from kurumaisu.sim.robots.model_changes import (
+    checked_pose,
+    moved,
+    rebuilt,
+    same_fans,
+    stuck,
+    with_newcomers,
+    without,
+)
 from kurumaisu.sim.robots.observation import Observation
 from kurumaisu.sim.robots.population import Population
 from kurumaisu.sim.robots.sensing import Sensing
@@ -132,20 +140,29 @@ class Simulator:
         """
         self._have(moved(self._machinery, self._index(model), checked_pose(pose)))
 
-    def spawn(self, models: str | Sequence[Model], pose: FloatArray | Sequence[float]) -> None:
+    def spawn(self, models: str | Sequence[Model], pose: FloatArray | Sequence[float]) -> str:
         """Add a model with all that stands on it, parents first, the first one at a pose (4,) in the map.
 
+        Return what it can be called by: `#` and its key.
         Text is read in the words of the world file, as `pioneer ( name "guest" )`. Raise Error with line and column.
         """
         if isinstance(models, str):
             snippet = read_snippet(models, self._world.vocabulary)
             models, self.warnings = snippet.models, (*self.warnings, *snippet.warnings)
-        population = with_newcomers(self._machinery.population, models, checked_pose(pose), self._step)
-        self._have(rebuilt(self._machinery, population))
+        before = self._machinery.population
+        self._have(rebuilt(self._machinery, with_newcomers(before, models, checked_pose(pose), self._step)))
+        return f"#{before.fresh}"
 
     def delete(self, model: str | int | Model) -> None:
         """Remove a model with all that stands on it. Raise Error for an unknown one."""
-        self._have(rebuilt(self._machinery, self._machinery.population.without(self._index(model))))
+        self._have(without(self._machinery, self._index(model)))
+
+    def restore(self, name: str) -> None:
+        """Bring a model back that was deleted, with all that stood on it, by its name or `#` and key.
+
+        Raise Error if it cannot be.
+        """
+        self._have(rebuilt(self._machinery, self._machinery.population.restored(name, self._step)))
 
     def grip(self, robot: int, closed: bool) -> bool:
         """Close or open the gripper of a robot, by its number; return whether it holds something now.

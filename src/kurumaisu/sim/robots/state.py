@@ -20,11 +20,11 @@ import numpy as np
 
 from kurumaisu.errors import Error, told
 from kurumaisu.sim.rangers.scans import Sweep
-from kurumaisu.sim.robots.population import Population
+from kurumaisu.sim.robots.population import Gone, Population
 from kurumaisu.world import model
 
 MARK = b"kurumaisu state "
-_VERSION = 2
+_VERSION = 3
 _FIRST_LINE = re.compile(rb"kurumaisu state (\d{1,9})(?: ([0-9a-f]{64}))?\n")
 _PLAIN = (bool, int, float, str, type(None))
 _NUMBERS = "biuf"  # kinds of arrays
@@ -32,7 +32,7 @@ _NUMBERS = "biuf"  # kinds of arrays
 _CLASSES: dict[str, type[Any]] = {
     each.__name__: each
     for each in (
-        *(Population, Sweep),
+        *(Population, Gone, Sweep),
         *(model.Model, model.Place, model.Shape, model.Polygon, model.Hinge, model.Walk),
         *(model.Position, model.Ranger, model.Fan, model.Camera, model.Fiducial, model.Bumper, model.Gripper),
     )

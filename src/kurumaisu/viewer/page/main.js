@@ -12,10 +12,15 @@ import {byId} from "./common/dom.js";
 import {Edit} from "./picture/edit.js";
 import {Effects} from "./panels/effects.js";
 import {download} from "./common/download.js";
+import {Frames} from "./panels/frames.js";
+import {GoalPanel} from "./panels/goal.js";
+import {History} from "./panels/history.js";
 import {keyTable, listen} from "./panels/keys.js";
 import {Options} from "./panels/options.js";
+import {added} from "./picture/palette.js";
 import {Permit} from "./server/permit.js";
 import {Places} from "./report/places.js";
+import {Plot} from "./plot/plot.js";
 import {Pointer} from "./picture/pointer.js";
 import {Recording} from "./panels/recording.js";
 import {Residuals} from "./panels/residuals.js";
@@ -53,12 +58,34 @@ async function ask(name, values) {
 // a drag is refused at many places on its way: what counts is the last one
 const quietly = (name, values) => connection.command(name, values);
 
-const transport = new Transport(scene, permit, ask, stick, say);
+const edits = new History(scene, permit, ask, say);
+/** Start again; what was done to the world can be done again. */
+async function restart(name, values) {
+  const reply = await ask(name, values);
+  if (reply.ok) edits.rewound();
+}
+const transport = new Transport(scene, permit, ask, stick, say, restart);
 stick.emergency = () => transport.stop();
 const bag = new Playback(scene, permit, ask);
 new Residuals(scene, picture, new Recording(scene, connection, picture, ask), say);
+/** What a tool does with two places of the world. */
+async function drawn(tool, from, to) {
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  if (tool === "estimate") {
+    options.set({tool: null});
+    ask("initial_pose", {x: from[0], y: from[1], yaw: Math.atan2(dy, dx)});
+  } else if (tool === "goal") {
+    options.set({tool: null});
+    goals.set(from, [dx, dy]);
+  } else {
+    const id = await edits.add(added(tool, from, to));
+    if (id !== null) options.set({selected: id});
+  }
+}
+const goals = new GoalPanel(scene, picture, permit, ask, say, () => stick.drive.body);
 const edit = new Edit(picture, scene, options, {
   can: (name) => permit.can(name), ask: quietly, failed: (text) => say(text, true),
+  moved: (...move) => edits.moved(...move), drawn,
 });
 const pointer = new Pointer(byId("front"), picture, {
   grab: (...place) => edit.grab(...place),
@@ -66,7 +93,9 @@ const pointer = new Pointer(byId("front"), picture, {
   panned: () => options.follow !== null && options.set({follow: null}),
 });
 new Effects(scene, permit, ask, say);
-new BodyPanel(scene, options, permit, ask, say);
+new Plot(scene, picture);
+new Frames(scene, ask);
+new BodyPanel(scene, options, permit, ask, say, edits);
 
 function chosen() {
   return options.selected === null ? null : scene.body(options.selected);
@@ -79,7 +108,7 @@ function follow() {
 }
 
 const tabs = setUpTabs();
-const table = keyTable({picture, options, transport, bag, stick, edit, pointer, tabs, follow, chosen});
+const table = keyTable({picture, options, transport, bag, stick, edit, pointer, tabs, follow, chosen, edits});
 listen(table);
 setUpHelp(table.filter(({shown}) => shown).map(({shown, meaning}) => [shown, meaning]));
 setUpTheme(() => picture.recolor());
@@ -96,6 +125,13 @@ click("screenshot", () => picture.flat().toBlob((blob) => {
   download(blob, `kurumaisu${t}.png`);
   say("The picture was saved.");
 }));
+
+click("save-world", async () => {
+  const reply = await ask("save_world");
+  if (!reply.ok) return;
+  download(new Blob([reply.result], {type: "text/plain"}), "saved.world");
+  say(`The world was saved as it is ${reply.message}.`);
+});
 
 permit.on("change", () => {
   // the panel of effects is the one to begin with where there are any

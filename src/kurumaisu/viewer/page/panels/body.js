@@ -4,9 +4,9 @@
 import {byId, degrees, fixed, make, radians, setText} from "../common/dom.js";
 
 export class BodyPanel {
-  /** ask(name, values): a command; say(text): for those who do not see the picture. */
-  constructor(scene, options, permit, ask, say) {
-    Object.assign(this, {scene, options, permit, ask, say});
+  /** ask(name, values): a command; say(text): for those who do not see the picture; edits: hears of what is done. */
+  constructor(scene, options, permit, ask, say, edits) {
+    Object.assign(this, {scene, options, permit, ask, say, edits});
     const select = byId("body-select");
     select.addEventListener("change", () => options.set({selected: select.value ? this.#bodies[select.value].id : null}));
     scene.on("world", () => this.#fill());
@@ -18,6 +18,7 @@ export class BodyPanel {
       event.preventDefault();
       this.#place();
     });
+    byId("delete").addEventListener("click", () => this.#chosen && edits.remove(this.#chosen));
     this.#fill();
   }
 
@@ -42,6 +43,7 @@ export class BodyPanel {
     byId("body-select").value = body ? String(this.#bodies.indexOf(body)) : "";
     const usable = Boolean(body?.movable) && this.permit.can("set_pose");
     byId("place-fields").disabled = !usable;
+    byId("delete").disabled = !body?.movable || !this.permit.can("delete");
     let why = this.permit.why;
     if (!body) why = "Choose a body here, or click on one in the picture.";
     else if (!why && !body.movable) why = "This body cannot be moved.";
@@ -72,8 +74,10 @@ export class BodyPanel {
   async #place() {
     const [x, y, yaw] = ["x", "y", "yaw"].map((name) => byId(`place-${name}`).valueAsNumber);
     const body = this.#chosen;
+    const before = this.scene.poseOf(body);
     const reply = await this.ask("set_pose", {body: body.id, x, y, yaw: radians(yaw)});
     if (!reply.ok) return;
+    if (before) this.edits.moved(body, before, [x, y, radians(yaw)]);
     this.#typed = false;
     this.say(`${body.name} was moved there.`);
   }

@@ -5,8 +5,8 @@ const PAN = 60; // [px]
 const ZOOM = 1.25;
 const TURN = Math.PI / 36;
 
-/** Return [{keys, shown, meaning, act, onMap}]; onMap: only while the picture, or nothing, has the focus. */
-export function keyTable({picture, options, transport, bag, stick, edit, pointer, tabs, follow, chosen}) {
+/** Return [{keys, shown, meaning, act, onMap, control}]; onMap: only while the picture, or nothing, has the focus. */
+export function keyTable({picture, options, transport, bag, stick, edit, pointer, tabs, follow, chosen, edits}) {
   const {camera} = picture;
   const moved = () => picture.dirty();
   const pan = (dx, dy) => () => {
@@ -19,7 +19,7 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
   };
   const turn = (angle) => () => {
     const body = chosen();
-    if (body) edit.place(body.id, withTurn(picture.scene.poseOf(body), angle));
+    if (body?.movable && picture.scene.poseOf(body)) edit.turn(body, angle);
   };
   return [
     {keys: [" "], shown: "Space", meaning: "emergency stop", act: () => transport.stop(), onMap: true},
@@ -46,6 +46,12 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
     {keys: ["["], act: turn(TURN)},
     {keys: ["]"], shown: "[ ]", meaning: "turn the chosen body by 5°", act: turn(-TURN)},
     {
+      keys: ["Delete", "Backspace"], shown: "Del", meaning: "delete the chosen body", onMap: true,
+      act: () => chosen()?.movable && edits.remove(chosen()),
+    },
+    {keys: ["z"], control: true, shown: "Ctrl Z", meaning: "undo adding, deleting, moving", act: () => edits.undo()},
+    {keys: ["y"], control: true, shown: "Ctrl Y", meaning: "redo", act: () => edits.redo()},
+    {
       keys: ["m"], shown: "m", meaning: "measure: drag in the picture",
       act: () => options.set({tool: options.tool === "measure" ? null : "measure"}),
     },
@@ -68,20 +74,19 @@ export function keyTable({picture, options, transport, bag, stick, edit, pointer
   ];
 }
 
-function withTurn([x, y, yaw], angle) {
-  return [x, y, Math.atan2(Math.sin(yaw + angle), Math.cos(yaw + angle))];
-}
-
 export function listen(table) {
   addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+    if (event.altKey || event.defaultPrevented) return;
+    const control = event.ctrlKey || event.metaKey;
     if (document.querySelector("dialog[open]")) return;
     const target = event.target;
-    const control = target.closest("button, input, select, textarea, summary, a");
+    const focused = target.closest("button, input, select, textarea, summary, a");
     const writing = target.closest("select, textarea, input:not([type=checkbox], [type=radio], [type=range])");
     if (writing && event.key !== "Escape") return;
-    const entry = table.find(({keys}) => keys?.includes(event.key.length === 1 ? event.key.toLowerCase() : event.key));
-    if (!entry || (entry.onMap && control)) return;
+    let key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    if (control && event.shiftKey && key === "z") key = "y";
+    const entry = table.find((one) => one.keys?.includes(key) && Boolean(one.control) === control);
+    if (!entry || (entry.onMap && focused)) return;
     event.preventDefault();
     entry.act();
   });

@@ -3,6 +3,8 @@
 
 import {News, byId, setPressed} from "../common/dom.js";
 
+const TOOLS = ["measure", "estimate", "goal", "box", "wall", "person"]; // as their buttons are called
+
 /** News: "change". */
 export class Options extends News {
   layers = {};
@@ -10,7 +12,7 @@ export class Options extends News {
   errorScale = 0;
   follow = null; // id of a body
   selected = null; // id of a body
-  tool = null; // "measure", "estimate", or null: choose and move
+  tool = null; // one of TOOLS, or null: choose and move
 
   constructor() {
     super();
@@ -22,14 +24,14 @@ export class Options extends News {
     }
     const scale = byId("error-scale");
     this.#bind(scale, () => (this.errorScale = Number(scale.value)));
-    for (const tool of ["measure", "estimate"]) {
+    for (const tool of TOOLS) {
       byId(tool).addEventListener("click", () => this.set({tool: this.tool === tool ? null : tool}));
     }
   }
 
   set(values) {
     Object.assign(this, values);
-    for (const tool of ["measure", "estimate"]) setPressed(byId(tool), this.tool === tool);
+    for (const tool of TOOLS) setPressed(byId(tool), this.tool === tool);
     setPressed(byId("follow"), this.follow !== null);
     this.tell("change");
   }

@@ -7,15 +7,15 @@ export class Transport {
   #seed = null; // that was shown
   #asked = false; // for a bag's beginning or end, and not answered yet
 
-  /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text). */
-  constructor(scene, permit, ask, stick, say) {
-    Object.assign(this, {scene, permit, ask, stick, say});
+  /** ask(name, values): a command, failures are said elsewhere; stick: to be let go at a stop; say(text); restart: as ask. */
+  constructor(scene, permit, ask, stick, say, restart) {
+    Object.assign(this, {scene, permit, ask, stick, say, restart});
     scene.on("state", () => this.#show());
     permit.on("change", () => this.#show());
     const click = (id, action) => byId(id).addEventListener("click", action);
     click("pause", () => this.togglePause());
     click("step", () => this.step());
-    click("reset", () => ask("reset"));
+    click("reset", () => restart("reset"));
     click("reseed", () => this.#reseed());
     click("record", () => this.#record());
     click("estop", () => (this.stopped ? ask("estop", {on: false}) : this.stop()));
@@ -52,7 +52,7 @@ export class Transport {
 
   #reseed() {
     const seed = byId("seed");
-    if (seed.reportValidity() && seed.value !== "") this.ask("seed", {value: Number(seed.value)});
+    if (seed.reportValidity() && seed.value !== "") this.restart("seed", {value: Number(seed.value)});
   }
 
   /** Show the speed that is wanted, whoever asked for it. */

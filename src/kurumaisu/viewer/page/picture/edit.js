@@ -1,24 +1,37 @@
 // SPDX-License-Identifier: BSD-3-Clause
-// Choosing, moving and turning bodies; measuring; telling the localization where the chair is.
+// Choosing, moving and turning bodies; what is drawn with a tool: a distance, a pose, something to be added.
 
 import {newest, short} from "../common/dom.js";
 import {label} from "./names.js";
 import {covers} from "../scene/shapes.js";
 
 const HANDLE = 26; // [px] from a body's edge to the handle that turns it
+const AT_ONCE = ["box", "wall", "person"]; // tools that do something with a click, too
 const GRIP = {mouse: 10, pen: 12, touch: 22}; // [px] radius in which handle and small bodies are hit
 
 export class Edit {
   #ghost = null; // {body, pose} that is asked for
-  #arrow = null; // {from, to, kind} of measuring and of an estimate
+  #arrow = null; // {from, to, kind} of a tool
+  #held = false;
+  #way = null; // {body, before, after} that is asked for, and whether some of it was done
 
-  /** can(name): may this command be given now? ask(name, values): gives it; resolves with its reply. */
-  constructor(picture, scene, options, {can, ask, failed}) {
-    Object.assign(this, {picture, scene, options, can, ask});
+  /**
+   * can(name): may this command be given now? ask(name, values): gives it; resolves with its reply; moved(body, before,
+   * after): hears of poses; drawn(tool, from, to): of places.
+   */
+  constructor(picture, scene, options, {can, ask, failed, moved, drawn}) {
+    Object.assign(this, {picture, scene, options, can, moved, drawn});
     this.place = newest(
-      (body, [x, y, yaw]) => ask("set_pose", {body, x, y, yaw}),
+      async (body, [x, y, yaw]) => {
+        const reply = await ask("set_pose", {body, x, y, yaw});
+        if (reply.ok && this.#way) this.#way.done = true;
+        return reply;
+      },
       (reply) => {
-        if (!this.#held) this.#ghost = null;
+        if (!this.#held) {
+          this.#ghost = null;
+          this.#record();
+        }
         if (!reply.ok) failed(reply.message);
         picture.dirty("front");
       },
@@ -26,7 +39,21 @@ export class Edit {
     picture.extras.push((context) => this.#draw(context));
   }
 
-  #held = false;
+  /** Turn a body by an angle. */
+  turn(body, angle) {
+    if (this.#way?.body.id !== body.id) this.#record();
+    const before = this.scene.poseOf(body);
+    const [x, y, yaw] = this.#way?.after ?? before;
+    const after = [x, y, Math.atan2(Math.sin(yaw + angle), Math.cos(yaw + angle))];
+    this.#way = {...this.#way ?? {body, before}, after};
+    this.place(body.id, after);
+  }
+
+  /** Tell of a move that is over, if there is one. */
+  #record() {
+    if (this.#way?.done) this.moved(this.#way.body, this.#way.before, this.#way.after);
+    this.#way = null;
+  }
 
   /** Return what a press at a place of the picture takes, or null. */
   grab(px, py, type) {
@@ -43,8 +70,10 @@ export class Edit {
   }
 
   click(px, py) {
-    const body = this.bodyAt(...this.picture.camera.toWorld(px, py), "mouse");
+    const at = this.picture.camera.toWorld(px, py);
     this.#arrow = null;
+    if (AT_ONCE.includes(this.options.tool)) return this.drawn(this.options.tool, at, at);
+    const body = this.bodyAt(...at, "mouse");
     this.options.set({selected: body?.id ?? null});
   }
 
@@ -98,8 +127,10 @@ export class Edit {
   #drag(body, pose) {
     const before = this.scene.poseOf(body);
     let moved = false;
+    this.#record();
     const put = (target, held) => {
       this.#held = held;
+      this.#way = {...this.#way ?? {body, before}, after: target};
       this.#ghost = {body: body.id, pose: target};
       this.place(body.id, target);
       this.picture.dirty("front");
@@ -110,7 +141,10 @@ export class Edit {
         put(pose(...this.picture.camera.toWorld(px, py)), true);
       },
       end: () => put(this.#ghost.pose, false),
-      cancel: () => moved && put(before, false),
+      cancel: () => {
+        if (moved) put(before, false);
+        this.#way = null; // it is as before
+      },
     };
   }
 
@@ -124,10 +158,8 @@ export class Edit {
       },
       end: () => {
         if (kind === "measure") return;
-        const [x, y, yaw] = [...from, angleOf(this.#arrow)];
-        this.ask("initial_pose", {x, y, yaw});
+        this.drawn(kind, from, this.#arrow.to);
         drop();
-        this.options.set({tool: null});
       },
       cancel: drop,
     };
@@ -142,11 +174,10 @@ export class Edit {
     if (!this.#arrow) return;
     const {from, to, kind} = this.#arrow;
     const [[x0, y0], [x1, y1]] = [camera.toScreen(...from), camera.toScreen(...to)];
-    line(context, x0, y0, x1, y1, colors);
-    const angle = `${short((angleOf(this.#arrow) * 180) / Math.PI)}°`;
-    const length = `${short(Math.hypot(to[0] - from[0], to[1] - from[1]))} m`;
+    if (kind === "box") frame(context, x0, y0, x1, y1, colors);
+    else line(context, x0, y0, x1, y1, colors);
     Object.assign(context, {font: "12px system-ui, sans-serif", textAlign: "left", textBaseline: "bottom"});
-    label(context, kind === "measure" ? `${length}, ${angle}` : angle, x1 + 10, y1 - 6, colors);
+    label(context, measures(this.#arrow), x1 + 10, y1 - 6, colors);
   }
 
   #drawGhost(context) {
@@ -175,8 +206,19 @@ export class Edit {
   }
 }
 
-function angleOf({from, to}) {
-  return Math.atan2(to[1] - from[1], to[0] - from[0]);
+/** What a person wants to know of what is drawn: the size of a box, the direction of a pose, or both. */
+function measures({from, to, kind}) {
+  const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
+  if (kind === "box") return `${short(Math.abs(dx))} m × ${short(Math.abs(dy))} m`;
+  const angle = `${short((Math.atan2(dy, dx) * 180) / Math.PI)}°`;
+  return kind === "estimate" || kind === "goal" ? angle : `${short(Math.hypot(dx, dy))} m, ${angle}`;
+}
+
+function frame(context, x0, y0, x1, y1, colors) {
+  context.beginPath();
+  context.rect(Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0), Math.abs(y1 - y0));
+  Object.assign(context, {strokeStyle: colors.accent, lineWidth: 1.5});
+  context.stroke();
 }
 
 function line(context, x0, y0, x1, y1, colors) {

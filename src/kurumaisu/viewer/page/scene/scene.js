@@ -7,6 +7,7 @@ import {prepare} from "./shapes.js";
 import {Trail} from "./trail.js";
 
 const JUMP = 1.0; // [s] that time must go back to be another run: messages may overtake each other
+const BODY = "body "; // in front of its id: the name of its trail
 const MARKS = 300; // collision marks, at most
 const SEEN = 600; // [ms] that a contact is shown, however short it was
 
@@ -75,6 +76,9 @@ export class Scene extends News {
 
   #takeWorld(message) {
     this.world = {...message, bodies: message.bodies.map(prepare)};
+    for (const name of this.trails.keys()) {
+      if (name.startsWith(BODY) && !this.body(name.slice(BODY.length))) this.trails.delete(name); // of who has left
+    }
     this.scans.clear();
     this.particles = null;
     this.#contacts = null; // counted anew
@@ -87,7 +91,7 @@ export class Scene extends News {
     }
     this.state = state;
     for (const body of this.world.bodies) {
-      if (body.kind === "robot" || body.kind === "person") this.#trail(`body ${body.id}`, state.poses?.[body.id]);
+      if (body.kind === "robot" || body.kind === "person") this.#trail(BODY + body.id, state.poses?.[body.id]);
     }
     for (const name of ["truth", "odom"]) this.#trail(name, state[name]);
     this.#trail("estimate", state.estimate?.pose);
