@@ -64,7 +64,7 @@ prove() {
   env -i "HOME=$place/use" PATH="$there/bin:/usr/bin:/bin" LANG=C.UTF-8 bash -eu "$root/.ci/wheel_use.bash" "$root/worlds/room.world"
 }
 
-tests=(test_examples.py test_model.py test_world.py)
+tests=(conftest.py test_examples.py test_model.py test_world.py)
 [ $# -gt 0 ] || set -- /usr/bin/python3 $(newest)
 for python; do
   name=$("$python" -c 'import sys; print("%d.%d" % sys.version_info[:2])')
