@@ -129,6 +129,7 @@ def _checks(tree: Inputs, quick: bool) -> list[Check]:
     settings = {path for path in tree.tree if path.parent == ROOT or path.is_relative_to(ROOT / ".ci")}
     written = {Path(path) for path in [*python, *cpp]} | {path for path in tree.tree if path.suffix == ".pyi"}
     package = tree.tree - tree.under("tests", ".ci")
+    in_wheel = {ROOT / "tests" / name for name in re.findall(r"test_\w+\.py", (ROOT / ".ci/wheel.bash").read_text())}
 
     def check(name: str, command: str, reads: set[Path], *files: str, **more: Any) -> Check:
         part = Part(name, lambda: tree.state(reads | settings, command))
@@ -151,6 +152,7 @@ def _checks(tree: Inputs, quick: bool) -> list[Check]:
         check(
             "install space", f"bash {ROOT}/.ci/install_space.bash", package, after=BUILD_TESTS, beside=True, quick=False
         ),
+        check("wheel", f"bash {ROOT}/.ci/wheel.bash", package | in_wheel, beside=True, quick=False),
         check("catkin build", f"bash {ROOT}/.ci/catkin_build.bash", package, beside=True, quick=False),
     ]
 

@@ -34,6 +34,7 @@ NOT_RUN = {
     r"/dev/ttyACM0|192\.168\.": "needs a sensor",
     r"critic experiment": "needs a chair with room around it; experiment.launch runs the same program",
     r"python -m pytest": "scripts/test runs it",
+    r"^(pip|kurumaisu) ": "is the wheel's: .ci/wheel.bash installs it, and runs its programs",
 }
 
 # Takes minutes: only its arguments are read. tests/test_bench*.py, test_paper*.py and test_riddles.py run parts of it.

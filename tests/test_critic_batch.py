@@ -26,7 +26,7 @@ CRITIC = [
     sys.executable,
     "-P",
     "-c",
-    "import sys; from kurumaisu.ros.tools.critic_command import main; sys.exit(main())",
+    "import sys; from kurumaisu.programs.critic import main; sys.exit(main())",
 ]
 
 

@@ -8,8 +8,8 @@ import time
 import pytest
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.pacing import Pacer
-from kurumaisu.ros.requests import Requests
+from kurumaisu.sim.live.pacing import Pacer
+from kurumaisu.sim.live.requests import Requests
 
 STEP = 0.01  # [s]
 

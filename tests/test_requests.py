@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.requests import Requests
+from kurumaisu.sim.live.requests import Requests
 
 
 def ask_from_a_thread(requests, action):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Mapping of a whole log at once: scans and odometry in, trajectory and map out."""
+"""Mapping of a whole log at once: scans and odometry in, trajectory and map out.
+
+Where the package was built without MRPT, importing this raises Error.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,19 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from kurumaisu import _slam, settings
-from kurumaisu._slam import Fan as Fan
+from kurumaisu import settings
 from kurumaisu.bounded_files import MOST_RAWLOG, check_file
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, one_line
 from kurumaisu.geometry import interpolate
 from kurumaisu.maps import Grid
 from kurumaisu.types import FloatArray
+
+try:
+    import kurumaisu._slam as _slam
+    from kurumaisu._slam import Fan as Fan
+except ImportError as error:
+    needed = "needs MRPT, which is not in the wheel: install the ROS package (docs/without_ros.md)"
+    raise Error(f"SLAM {needed}: {error}") from error
 
 MapperSettings = dict[str, float]
 
@@ -114,8 +123,8 @@ def read_rawlog(path: Path) -> ScanLog:
     check_file(path, MOST_RAWLOG)
     try:
         times, odom, ranges, fan = _slam.read_rawlog(str(path))
-    except RuntimeError as error:
-        raise Error(str(error)) from error
+    except (OSError, RuntimeError, ValueError) as error:
+        raise Error(one_line(error)) from error  # it names the file
     return ScanLog(path.name, times, ranges, odom, odom, fan)
 
 

@@ -21,9 +21,9 @@ from std_srvs.srv import (
 )
 
 from kurumaisu.errors import Error
-from kurumaisu.ros.pacing import Pacer
-from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.rotation import pose_of
+from kurumaisu.sim.live.pacing import Pacer
+from kurumaisu.sim.live.requests import Requests
 from kurumaisu.sim.robots.saved_world import Scene, world_file
 from kurumaisu.sim.robots.state_folder import StateFolder
 from kurumaisu.srv import (

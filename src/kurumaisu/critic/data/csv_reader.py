@@ -77,7 +77,7 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
 
 def read_queries(path: Path) -> FloatArray:
     """Read query.csv into (q, 2) of t0, t1 [s]. Raise Error naming file and line for t1 before t0."""
-    columns, rows, _ = _read(path, ("t0", "t1"))
+    columns, rows, _ = read_table(path, ("t0", "t1"))
     return check_queries(str(path), rows[:, [columns.index("t0"), columns.index("t1")]], first=2)
 
 
@@ -94,7 +94,7 @@ def check_queries(where: str, queries: FloatArray, first: int = 0) -> FloatArray
 
 def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | None, dict[str, Series]]:
     """Return the part itself and the covariates among its columns."""
-    columns, rows, dropped = _read(path, ("t", *REQUIRED[part]), OPTIONAL.get(part, ()))
+    columns, rows, dropped = read_table(path, ("t", *REQUIRED[part]), OPTIONAL.get(part, ()))
     if part == "pose":
         _check_heading(path, columns)
     for column in dropped:
@@ -145,7 +145,7 @@ def _is_beam(name: str) -> bool:
     return name.startswith("r") and name[1:].isdecimal()
 
 
-def _read(
+def read_table(
     path: Path, required: tuple[str, ...], optional: tuple[str, ...] = ()
 ) -> tuple[list[str], FloatArray, list[str]]:
     """Return column names, rows (n, columns), and the names of columns without any number, left out.

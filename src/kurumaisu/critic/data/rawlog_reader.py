@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.bounded_files import MOST_RAWLOG, check_file
 from kurumaisu.critic.data.clean import Faults, Table, clean
 from kurumaisu.critic.data.odometry import COLUMNS, rates_between
 from kurumaisu.critic.values.recording import LaserMount, Run
-from kurumaisu.errors import Error, one_line
 from kurumaisu.types import FloatArray
 
 
@@ -27,17 +25,11 @@ def rawlog_name(path: Path) -> str:
 
 
 def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
-    """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error for what MRPT cannot read."""
-    check_file(path, MOST_RAWLOG)
-    try:
-        t, odom, ranges, fan = import_module("kurumaisu._slam").read_rawlog(str(path))
-    except ImportError as error:
-        raise Error(f"{path}: this build cannot read rawlogs: {error}") from error
-    except (OSError, RuntimeError, ValueError) as error:
-        raise Error(one_line(error)) from error  # it names the file
-    run = to_run(rawlog_name(path), t, odom, np.asarray(ranges, dtype=np.float64), faults)
-    x, y, yaw = fan.base_from_laser
-    return run, LaserMount(x, y, yaw, fan.angle_min, fan.angle_increment, ranges.shape[1])
+    """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error where MRPT cannot, or is not."""
+    log = import_module("kurumaisu.slam").read_rawlog(path)
+    run = to_run(rawlog_name(path), log.times, log.odom, np.asarray(log.ranges, dtype=np.float64), faults)
+    x, y, yaw = log.fan.base_from_laser
+    return run, LaserMount(x, y, yaw, log.fan.angle_min, log.fan.angle_increment, log.ranges.shape[1])
 
 
 def to_run(name: str, t: FloatArray, odom: FloatArray, ranges: FloatArray, faults: Faults) -> Run:

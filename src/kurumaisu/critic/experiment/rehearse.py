@@ -12,7 +12,8 @@ import yaml
 
 from kurumaisu import program, settings
 from kurumaisu.critic.data.csv_writer import write_csv_run
-from kurumaisu.critic.experiment.rehearsal import Manner, Rehearsal
+from kurumaisu.critic.experiment.rehearsal import Rehearsal
+from kurumaisu.critic.experiment.simulated import Manner
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error, failed
 from kurumaisu.experiments import base_limits, load_script, names, shipped_script

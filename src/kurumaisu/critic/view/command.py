@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from kurumaisu import program, settings
 from kurumaisu.critic.app.options import name_list
@@ -18,7 +19,7 @@ from kurumaisu.critic.view.album import read_album
 from kurumaisu.critic.view.tape import Showing
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model, shipped
-from kurumaisu.viewer import Hub, Server, ViewerSettings, read_settings, report
+from kurumaisu.viewer import Hub, Server, Source, ViewerSettings, read_settings, report
 from kurumaisu.viewer.playback import Playback
 from kurumaisu.world import load_world
 
@@ -51,6 +52,11 @@ def _serve(options: argparse.Namespace) -> None:
     folder = _report_folder(options.recording, options.report)
     print(f"view: reading {options.recording}", file=sys.stderr, flush=True)
     server = opened(options.recording, options.runs, options.model, folder, viewer_settings(options.port))
+    stay(server)
+
+
+def stay(server: Opened) -> None:
+    """Serve, and tell where, until Ctrl-C or SIGTERM."""
     ends = {signal.SIGINT, signal.SIGTERM}
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # before threads begin: they inherit it
     try:
@@ -61,10 +67,20 @@ def _serve(options: argparse.Namespace) -> None:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-class Opened:
-    """A recording that is being served; a context that ends it."""
+class Live(Source, Protocol):
+    """What is shown goes on by itself."""
 
-    def __init__(self, source: Playback, server: Server, told: str) -> None:
+    def start(self) -> None:
+        """Begin."""
+
+    def close(self) -> None:
+        """Stop."""
+
+
+class Opened:
+    """Something that is being served; a context that ends it."""
+
+    def __init__(self, source: Live, server: Server, told: str) -> None:
         self.source, self.server, self.told = source, server, told
 
     def __enter__(self) -> Opened:
@@ -126,7 +142,8 @@ def _report_folder(recording: Path, given: Path | None) -> Path | None:
     return next((recording / name for name in _USUAL if (recording / name / report.NAME).is_file()), None)
 
 
-def _port(text: str) -> int:
+def port_number(text: str) -> int:
+    """Return a port. Raise ArgumentTypeError for anything else."""
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"must be a whole number of 0 to 65535: {text!r}")
     return int(text)
@@ -145,5 +162,5 @@ def _parser() -> argparse.ArgumentParser:
     add("--report", type=Path, metavar="FOLDER", help="what the critic wrote (criticism or report in the recording)")
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add("--model", type=Path, metavar="FILE", help="model to compare with (the recording's, else md100.yaml)")
-    add("--port", type=_port, metavar="N", help="port to listen at; 0 takes a free one (launch/viewer.yaml's)")
+    add("--port", type=port_number, metavar="N", help="port to listen at; 0 takes a free one (launch/viewer.yaml's)")
     return parser

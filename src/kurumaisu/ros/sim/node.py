@@ -18,8 +18,6 @@ from kurumaisu.msg import Voltages
 from kurumaisu.params import EffectSetting
 from kurumaisu.ros import life, messages
 from kurumaisu.ros.inbox import Rates, nanoseconds_of, rates_of, subscribe
-from kurumaisu.ros.pacing import Pacer
-from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
 from kurumaisu.ros.sim.effects import NAMESPACE, LiveEffects
 from kurumaisu.ros.sim.laser import LaserOutput, laser_output
@@ -29,6 +27,8 @@ from kurumaisu.ros.view.fans import ChairFan
 from kurumaisu.ros.view.topics import ViewTopics
 from kurumaisu.sim.chair.holder import VoltageHolder
 from kurumaisu.sim.chair.simulator import ChairSimulator, Observation
+from kurumaisu.sim.live.pacing import Pacer
+from kurumaisu.sim.live.requests import Requests
 from kurumaisu.sim.robots.newcomers import newcomers
 from kurumaisu.sim.robots.saved_world import Scene
 from kurumaisu.types import FloatArray

@@ -15,11 +15,11 @@ import rospy
 from kurumaisu import program
 from kurumaisu.errors import Error
 from kurumaisu.ros import life
-from kurumaisu.ros.pacing import Pacer
-from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.stageros.services import StagerosServices
 from kurumaisu.ros.stageros.session import Session
 from kurumaisu.ros.stageros.settings import StagerosSettings, read_settings
+from kurumaisu.sim.live.pacing import Pacer
+from kurumaisu.sim.live.requests import Requests
 from kurumaisu.world import World, load_world
 
 _USAGE = "usage: stageros [-g] [-u] FILE.world"

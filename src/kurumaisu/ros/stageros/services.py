@@ -6,10 +6,10 @@ from __future__ import annotations
 import rospy
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
-from kurumaisu.ros.pacing import Pacer
-from kurumaisu.ros.requests import Requests
 from kurumaisu.ros.services import Services
 from kurumaisu.ros.stageros.session import Session
+from kurumaisu.sim.live.pacing import Pacer
+from kurumaisu.sim.live.requests import Requests
 from kurumaisu.sim.robots.state_folder import StateFolder
 
 

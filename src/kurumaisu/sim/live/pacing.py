@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 
 from kurumaisu.plausible import require
-from kurumaisu.ros.requests import Requests
+from kurumaisu.sim.live.requests import Requests
 
 _GLANCE = 0.1  # [s] a wait lasts at most: a step may take hours, and its caller has more to look after
 _BEHIND = 0.2  # [s] too far behind to catch up in one burst

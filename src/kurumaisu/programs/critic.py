@@ -22,27 +22,37 @@ _PARTS = {
 _NODES = ("experiment", "watch")
 
 
-def main() -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Run a command by its name, or criticise recordings; return the exit code."""
     # The same sums in the same order, however many cores there are and however many recordings run at once.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    name, arguments = (sys.argv[1] if len(sys.argv) > 1 else ""), sys.argv[2:]
+    words = sys.argv[1:] if words is None else words
+    name = words[0] if words else ""
     if name in _NODES:
         program.die_of_ctrl_c()
     if name in _PARTS:
-        command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
-        return _told(command, arguments)
+        return _told(name, words[1:])
     from kurumaisu.critic.app import options
 
-    options.parse(None)  # --help and a wrong option need not wait for what the critic imports
+    options.parse(words)  # --help and a wrong option need not wait for what the critic imports
     from kurumaisu.critic.app import cli
 
-    return cli.main()
+    return cli.main(words)
 
 
-def _told(command: Callable[[Sequence[str]], int], arguments: Sequence[str]) -> int:
-    """Run a command; say what was wrong with its input on one line."""
+def _told(name: str, arguments: Sequence[str]) -> int:
+    """Run a command; say what was wrong with its input, or is not there, on one line."""
     try:
-        return command(arguments)
+        return _command(name)(arguments)
     except Error as error:
         return failed("critic", error)
+
+
+def _command(name: str) -> Callable[[Sequence[str]], int]:
+    try:
+        command: Callable[[Sequence[str]], int] = import_module(_PARTS[name]).main
+    except ModuleNotFoundError as error:
+        if name in _NODES:
+            raise Error(f"{name} needs ROS: install the ROS package (docs/without_ros.md): {error}") from error
+        raise
+    return command
