@@ -34,7 +34,6 @@ _JUMP = 0.15  # [m] between the two sides of an edge, at least
 _FLAT = 0.2  # share of it by which either side may go on
 _BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
 _INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
-_LASTS = 0.03  # [m] within which a reading between two sides comes again where a beam meets a third one
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
+        out.append(_share(_once(_mixed(readings) & self._jumps, self._stand)))
         return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def names(self) -> list[str]:
@@ -226,18 +225,16 @@ def _mixed(readings: FloatArray) -> BoolArray:
         return np.asarray((np.abs(jump) > _JUMP) & flat & (share > _INSIDE) & (share < 1 - _INSIDE))
 
 
-def _lasting(readings: FloatArray, stand: IntArray) -> BoolArray:
-    """Return which readings (k, b - 6) come again in the scan before or after from the same place; stand (k,).
+def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
+    """Return a mask (k, n) in which each column counts once in the scans from the same place; stand (k,).
 
-    What lies between two sides there is a narrow face that an error of the pose hides from the model: one face, but
-    counted in every scan. Mixed readings differ from scan to scan.
+    From one place, a beam as wide as it is meets the same two surfaces in every scan; so does a narrow face that an
+    error of the pose hides from the model.
     """
-    with np.errstate(invalid="ignore"):
-        same = np.abs(np.diff(readings[:, 3:-3], axis=0)) < _LASTS
-    same &= ((stand[1:] == stand[:-1]) & (stand[1:] >= 0))[:, np.newaxis]
-    out = np.zeros(readings[:, 3:-3].shape, dtype=bool)
-    out[1:] |= same
-    out[:-1] |= same
+    out = mask.copy()
+    for place in np.unique(stand[stand >= 0]):
+        rows = np.flatnonzero(stand == place)
+        out[rows[1:]] &= ~np.logical_or.accumulate(mask[rows[:-1]], axis=0)
     return out
 
 
