@@ -71,3 +71,17 @@ def test_a_few_rows_that_come_late_are_no_fault_of_the_others(seed):
 def test_true_stamps_are_no_fault(rate):
     for seed in SEEDS:
         assert stamped(seed, rate, lambda t, _: t) is None
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_gaps_while_the_robot_changes_its_speed_are_no_fault(seed):
+    """Of a reference that is lost where the robot stops or sets off: what it drove in the gap is not its usual speed."""
+    rng = np.random.default_rng(seed)
+    pose = phased(rng, rate=50.0).pose
+    speed = np.hypot(*np.diff(pose.values[:, :2], axis=0).T) * 50.0
+    changes = pose.t[1:-1][np.abs(np.diff(speed)) > 5 * np.median(np.abs(np.diff(speed)))]
+    kept = np.ones(len(pose.t), dtype=bool)
+    for begin in rng.choice(changes, 5):
+        kept &= (pose.t < begin - 0.5) | (pose.t > begin + 0.7)
+    stamps = pose.t + rng.uniform(-0.004, 0.004, len(pose.t))
+    assert pose_stamps.problem(Series(stamps[kept], pose.values[kept], pose.columns)) is None

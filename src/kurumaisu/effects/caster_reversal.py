@@ -19,7 +19,9 @@ _DRIVES, _TURNS = 0.02, 0.05
 class CasterReversal(Effect):
     """After each change of the driving direction an additional yaw rate, which dies away with the distance.
 
-    Its side is that of the last turn before the reversal, which is where the casters stand.
+    Its side, by `by`: 0 that of the last turn before the reversal, which is where the casters stand; 1 the same as long
+    as the chair then drives forward, the other one backward, where it follows its casters; 2 always the same, as of one
+    caster that is stiff.
     """
 
     id = "base.caster_reversal"
@@ -27,10 +29,15 @@ class CasterReversal(Effect):
     parameters = (
         Parameter("kick", "rad/s", null=0.0, scale=0.1, lower=-2.0, upper=2.0),
         Parameter("length", "m", null=0.25, scale=0.25, lower=0.01, upper=5.0),
+        Parameter("by", "1", null=0.0, scale=1.0, lower=0.0, upper=2.0),
     )
+    forms = ({"by": 0.0}, {"by": 1.0}, {"by": 2.0})
     empirical = True
     sentence = "after a reversal the chair swings to one side until its casters have turned"
-    formula = "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn"
+    formula = (
+        "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn; "
+        "by = 1: the other side in reverse, 2: always +"
+    )
     source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
     shows_in = Rate.W
     follows = Follows.V_CHANGE
@@ -46,7 +53,7 @@ class CasterReversal(Effect):
         if self._turns is None:
             self._turns = np.zeros(max(round(_SWING / motion.dt), 1))
         past = self._turns
-        turns = np.concatenate([past, _held(_signs(motion.w, _TURNS), float(past[-1]))])
+        turns = np.concatenate([past, _held(self._sides(motion.w), float(past[-1]))])
         earlier = np.concatenate([[self._direction], direction[:-1]])
         reversed_here = (direction != earlier) & (earlier != 0)
         side = _last(reversed_here, turns[: len(motion.w)], self._side)
@@ -56,12 +63,17 @@ class CasterReversal(Effect):
         kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
         self._direction, self._turns, self._side = float(direction[-1]), turns[-len(past) :], float(side[-1])
         self._travel = float(since[-1] + way[-1])
+        side = side * direction if round(self.values["by"]) == 1 else side
         return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > RESTS))
 
     def settle(self, motion: Motion) -> None:
         """Have the casters trail."""
         self._direction = float(_signs(motion.v, _DRIVES)[-1])
-        self._turns = np.full(max(round(_SWING / motion.dt), 1), _signs(motion.w, _TURNS)[-1])
+        self._turns = np.full(max(round(_SWING / motion.dt), 1), self._sides(motion.w)[-1])
+
+    def _sides(self, w: FloatArray) -> FloatArray:
+        """Return to which side turns put the casters, (n,), 0 where they leave them."""
+        return np.ones(len(w)) if round(self.values["by"]) == 2 else _signs(w, _TURNS)
 
 
 def _signs(rates: FloatArray, least: float) -> FloatArray:

@@ -37,7 +37,7 @@ class Mechanism:
     empirical: the formula is the simplest of a family of curves, of which a chair may follow another.
     choices: where not empty, the only parameters that a critic considers: the effect acts so, or not at all.
     forms: where not empty, the values of some parameters that a critic considers, the usual ones first; it fits the
-    other parameters.
+    other parameters. A setting may leave them out, which means the usual ones.
     """
 
     id: ClassVar[str]
@@ -60,16 +60,22 @@ class Mechanism:
     def change(self, values: Mapping[str, float]) -> None:
         """Go on with other values from the state that it is in. Raise Error, with nothing changed, as at the start."""
         self.check(values)
-        self.values = dict(values)
+        self.values = {**self.usual(), **values}
+
+    @classmethod
+    def usual(cls) -> dict[str, float]:
+        """Return the parameters that say which form it has, as they usually are."""
+        return dict(cls.forms[0]) if cls.forms else {}
 
     @classmethod
     def check(cls, values: Mapping[str, float]) -> None:
         """Raise Error for a parameter that is missing, unknown or out of its bounds."""
         names = [parameter.name for parameter in cls.parameters]
-        if sorted(values) != sorted(names):
+        whole = {**cls.usual(), **values}
+        if sorted(whole) != sorted(names):
             raise Error(f"{cls.id}: needs the parameters {', '.join(names)}; got {', '.join(values) or 'none'}")
         for parameter in cls.parameters:
-            value = values[parameter.name]
+            value = whole[parameter.name]
             if not parameter.lower <= value <= parameter.upper:
                 limits = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                 raise Error(f"{cls.id}: {parameter.name} must be {limits}: {value:g}")

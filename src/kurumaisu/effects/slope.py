@@ -14,6 +14,7 @@ class Slope(Effect):
     """Forward speed less what the climb costs; a chair at rest is held by its brakes.
 
     One that comes to rest slowly is held before it does: it would roll down for as long as its last turn dies away.
+    driving: 1 if it is held on the spot, too, where only its turn drives the wheels.
     """
 
     id = "base.slope"
@@ -21,11 +22,13 @@ class Slope(Effect):
     parameters = (
         Parameter("climb_x", "m/s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),
         Parameter("climb_y", "m/s", null=0.0, scale=0.02, lower=-0.5, upper=0.5),
+        Parameter("driving", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
     )
+    forms = ({"driving": 0.0}, {"driving": 1.0})
     sentence = "the chair is slower in one direction than in the opposite one, as on a slope"
     formula = (
         "v − g · (climb_x · cos(θ) + climb_y · sin(θ)); θ: heading in the map; "
-        "g = tanh(√((v / 0.02 m/s)² + (w / 0.04 rad/s)²))"
+        "g = tanh(√((v / 0.02 m/s)² + (1 − driving) · (w / 0.04 rad/s)²))"
     )
     source = "a wheelchair's model with gravity on inclines, 2016; 10-40 mm/s"
     shows_in = Rate.V
@@ -41,5 +44,6 @@ class Slope(Effect):
         # A sum of turns drifts away from where a chair on a real floor heads: better what was measured.
         heading = motion.known.get("heading", after - motion.w * motion.dt / 2)
         loss = self.values["climb_x"] * np.cos(heading) + self.values["climb_y"] * np.sin(heading)
-        rolls = np.tanh(np.hypot(motion.v / _CREEPS[0], motion.w / _CREEPS[1]))
+        turns = np.sqrt(1 - self.values["driving"]) * motion.w / _CREEPS[1]
+        rolls = np.tanh(np.hypot(motion.v / _CREEPS[0], turns))
         return replace(motion, v=motion.v - rolls * loss)

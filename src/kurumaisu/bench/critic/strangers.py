@@ -147,7 +147,8 @@ def _gained(path: Path, found: Criticism) -> tuple[float | None, bool]:
     model = oracle = ours = 0.0
     with path.open(encoding="utf-8") as stream:
         for row in csv.DictReader(stream):
-            key = row["run"], row["channel"], round(float(row["t0"]), 3), round(float(row["t1"]), 3), int(row["beam"])
+            times = round(float(row["t0"]), 3), round(float(row["t1"]), 3)
+            key = row["run"], row["channel"], *times, int(row["beam"] or -1)
             mean, sd = said.get(key, (np.nan, np.nan))
             if np.isfinite(mean) and np.isfinite(sd):
                 value = float(row["value"])

@@ -56,7 +56,8 @@ def _clock(cause: Cause) -> _Clock | None:
         return None
 
     def shift(stamp: float, end: str = "estimate") -> float:
-        values = {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
+        values = {p.name: p.null for p in effect.parameters}
+        values |= {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
         return float(effect(values, np.random.default_rng(0)).apply(Beams.single(stamp)).times[0]) - stamp
 
     at, growth = shift(0.0), (shift(_LATER) - shift(0.0)) / _LATER

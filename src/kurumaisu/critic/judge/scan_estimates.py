@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from kurumaisu.types import FloatArray
 # Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
 # as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
 _ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
+_SAME = 3.0  # sds of an offset within which it is half a step
+_STEPS, _SHIFT = "laser.quantisation", "laser.offset"
 _LACKS = 0.05  # share of readings of that part, at least
 
 
@@ -77,6 +80,25 @@ def with_scatter(
             known[name] = _joined(known.get(name), each)
         out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
     return tuple(known.values()), tuple(out.values())
+
+
+def with_cut_steps(
+    causes: Sequence[Cause], settings: Mapping[str, EffectSetting]
+) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
+    """Return causes and settings with an offset of half a step taken for what it is: the remainder is cut off."""
+    known = {cause.id: cause for cause in causes}
+    steps, shift = known.get(_STEPS), known.get(_SHIFT)
+    size = shift.parameters.get("offset") if shift is not None else None
+    if steps is None or shift is None or size is None:
+        return tuple(causes), tuple(settings.values())
+    half, sd = settings[_STEPS].parameters["step"] / 2, (size.hi90 - size.lo90) / (2 * NORMAL90)
+    cut = -float(np.sign(size.estimate))
+    if abs(size.estimate + cut * half) > _SAME * sd or half < _SAME * sd:
+        return tuple(causes), tuple(settings.values())
+    whole = replace(steps, gain_nats=steps.gain_nats + shift.gain_nats)
+    setting = EffectSetting(_STEPS, {**settings[_STEPS].parameters, "cut": cut})
+    rest = tuple(whole if cause is steps else cause for cause in causes if cause is not shift)
+    return rest, tuple(setting if name == _STEPS else one for name, one in settings.items() if name != _SHIFT)
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
 from kurumaisu.critic.unknown.bases import Basis
@@ -17,7 +18,7 @@ from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3
-_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s"}  # all others are angles
+_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s"}  # all others of RANGE_COVARIATES are angles
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,12 @@ def shape(rival: SetWithBlock, basis: Basis, gram: FloatArray) -> str:
     _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
     described = RangeCurve(basis, coefficients, covariance)
     found, at = shape_of(described), grid(described)
-    unit = _UNITS.get(basis.covariate, "rad")
+    unit = _UNITS.get(basis.covariate, "rad" if basis.covariate in effects.RANGE_COVARIATES else "")
     size, low, high = 1e3 * (np.abs(found.size) if found.kind == "line" else found.size)
     told = f"{size:.3g} mm (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
-    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}"
+    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
     if found.kind == "line":
         return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} {span}"
     if found.kind == "irregular":
         return f"irregular, within {told} {span}"
-    return f"{found.kind} of {told} at {found.place[0]:.3g} {unit}"
+    return f"{found.kind} of {told} at {found.place[0]:.3g} {unit}".rstrip()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -49,9 +50,19 @@ def examine(recording: Recording, model: Model) -> Faults:
     late = [line.startswith(map_agreement.CLOCKS) for _, line in told]
     if any(late) and laser is not None and segments is not None and _drifts(recording, laser, model, segments):
         told = [each for each, clock in zip(told, late, strict=True) if not clock]
-    for run, line in told:
+    for run, line in [*told, *_copies(recording)]:
         faults.add(f"{run.name}: {line}", fatal=True)
     return faults
+
+
+def _copies(recording: Recording) -> Iterator[tuple[Run, str]]:
+    """Yield the runs that are another run once more, with words for it."""
+    measured = [(run, run.pose) for run in recording.runs if run.pose is not None and run.pose_source == "measured"]
+    for i, (run, pose) in enumerate(measured):
+        for other, earlier in measured[:i]:
+            if rows.copied(pose, earlier):
+                yield run, f"has the poses of {other.name}, to the last bit: a copy; leave one of them out"
+                break
 
 
 def _segments(recording: Recording) -> FloatArray | None:

@@ -14,6 +14,7 @@ from kurumaisu.types import BoolArray, FloatArray
 _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
 _LEAST = 40  # intervals while driving
+_MISSING = 5.0  # times the mean interval, from which poses are missing: how fast the robot went there nobody knows
 _CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
 _MOSTLY = 0.8  # share of the rows by which stamps are judged
 _JITTER = 0.05  # [s] of their error, from which it is more than rows written on a grid
@@ -72,12 +73,12 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] 
         return None
     way = np.hypot(*np.diff(pose.values[:, :2], axis=0).T)
     around = np.ones(2 * half + 1)
-    time, gone = (np.convolve(each, around, mode="same") for each in (dt, way))
-    speed = gone / time
-    driving = speed * time / len(around) > _CLEAR * position_noise(pose)
+    there = dt < _MISSING * float(dt.mean())
+    number, time, gone = (np.convolve(each, around, mode="same") for each in (1.0 * there, dt * there, way * there))
+    speed, usual = gone / np.maximum(time, 1e-9), time / np.maximum(number, 1.0)
+    driving = there & (speed * usual > _CLEAR * position_noise(pose))
     driving &= np.convolve((dt > PAUSE) | rests, around, mode="same") == 0
     driving[:half] = driving[-half:] = False
     if driving.sum() < _LEAST:
         return None
-    usual = time[driving] / len(around)
-    return dt[driving] - usual, way[driving] / speed[driving] - usual
+    return (dt - usual)[driving], (way / np.maximum(speed, 1e-9) - usual)[driving]

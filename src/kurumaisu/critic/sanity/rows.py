@@ -12,6 +12,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FROZEN = 2.0  # [s] of standing while far more than usual is asked for
 _BLOCK = 8  # rows that repeat earlier ones exactly, in their order
+_COPIED = 20  # poses of a moving robot that are another run's, at least
 _GRID = 0.02  # [m] a grid finer than this is no harm
 _DECIMALS = 9
 MOVING = 0.05  # [m/s, rad/s] above this a robot is on its way
@@ -39,6 +40,13 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
         f"the reference pose stands still, to the last bit, for {total:.3g} s while the input commands motion (longest "
         f"{worst:.3g} s, from t = {moment(at)}): frozen; cut these rows out"
     )
+
+
+def copied(pose: Series, earlier: Series) -> bool:
+    """Tell whether poses are those of an earlier run once more: measured again, none is the same to the last bit."""
+    own, other = (np.round(each.values[1:, :3][~_still(each)], _DECIMALS) for each in (pose, earlier))
+    known = {row.tobytes() for row in other}
+    return len(own) >= _COPIED and sum(row.tobytes() in known for row in own) > len(own) / 2
 
 
 def _still(pose: Series) -> BoolArray:

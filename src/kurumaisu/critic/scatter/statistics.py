@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
+from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
@@ -29,12 +29,10 @@ _PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a ste
 _PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
 _AMID = (0.1, 0.9)  # quantiles of readings between which walls are everywhere
-_SQUARE = np.radians(60.0)  # [rad] within which a wall beside a jump hardly moves with an error of the heading
 _JUMP = 0.15  # [m] between the two sides of an edge, at least
-_FLAT = 0.2  # share of it by which either side may go on
-_BESIDE = 3  # beams by which errors of the pose move a narrow face that lies between two sides in truth
-_INSIDE = 0.15  # share of it from either side, beyond which a reading lies between them
-_LASTS = 0.03  # [m] within which a reading between two sides comes again where a beam meets a third one
+_ASIDE = 1.5  # beams to either side within which a beam may meet another surface
+_FINELY = 4  # directions per beam in which the surfaces about it are sought
+_CLEAR, _FINE = 5.0, 0.005  # sds, and [m], from a surface, beyond which a reading is not of it
 
 
 @dataclass(frozen=True)
@@ -76,13 +74,13 @@ class Statistics:
         self._farthest = assembly.shots.laser.range_max
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
-        self._jumps = _jumps(seen.ranges, seen.incidence)
         self._stand = assembly.layout.stand
         self._basis, self._size = basis_of(assembly, noise)
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
         limit = steepest(seen.level, seen.incidence)[:, :, axes]
         self._moves = np.clip(self._basis, -limit, limit)
         self._reach = np.sqrt(np.sum((self._moves[:, :, 1:] * self._size[:, np.newaxis, 1:]) ** 2, axis=2))
+        self._edges = _Edges(assembly, _CLEAR * self._sd + self._reach + _FINE)
         self._fits: dict[tuple[float, float], ScanFit] = {}
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -112,7 +110,7 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_mixed(readings) & self._jumps & ~_lasting(readings, self._stand)))
+        out.append(_share(_once(self._edges.mixed(np.where(np.isfinite(readings), error, np.nan)), self._stand)))
         return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def names(self) -> list[str]:
@@ -180,6 +178,38 @@ class Statistics:
         return self._fits[ends].leftover(error)
 
 
+class _Edges:
+    """Where beams pass the edge of a surface, and which readings there are of no surface at all."""
+
+    def __init__(self, assembly: Assembly, clear: FloatArray) -> None:
+        """Take the geometry; clear (k, b) [m]: from a surface, beyond which a reading is not of it."""
+        shots, seen = assembly.shots, assembly.marks.seen
+        count = round(_ASIDE * _FINELY)
+        turns = abs(shots.laser.angle_increment) / _FINELY * np.arange(-count, count + 1)
+        ways = np.array([hits_of(shots, (), 0, shift=np.array([0.0, 0.0, a]), like=seen).ranges for a in turns])
+        with np.errstate(invalid="ignore"):
+            jumps = np.abs(np.diff(ways, axis=0)) > _JUMP
+        self._at = np.nonzero(jumps.any(axis=0) & np.isfinite(ways).all(axis=0))
+        self._shape, self._clear = seen.ranges.shape, clear[self._at]
+        self._base, ways, jumps = assembly.marks.base[self._at], ways[(slice(None), *self._at)], jumps[(slice(None), *self._at)]
+        # from the range met to the reading of it, which is nearly the same
+        ways += self._base - seen.ranges[self._at]
+        self._low, self._high = np.minimum(ways[1:], ways[:-1]), np.maximum(ways[1:], ways[:-1])
+        self._low, self._high = np.where(jumps, ways[1:], self._low), np.where(jumps, ways[1:], self._high)
+        self._ends = ways.min(axis=0), ways.max(axis=0)
+
+    def mixed(self, error: FloatArray) -> BoolArray:
+        """Return which readings (k, b) lie between the surfaces about their beam, clear of each; error [m]: of them."""
+        said = self._base + error[self._at]
+        near, far = self._ends
+        with np.errstate(invalid="ignore"):
+            met = ((said > self._low - self._clear) & (said < self._high + self._clear)).any(axis=0)
+            between = (said > near + self._clear) & (said < far - self._clear) & ~met
+        out = np.zeros(self._shape, dtype=bool)
+        out[self._at] = between
+        return out
+
+
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
     found: list[tuple[str, str, BoolArray]] = []
     for kind, values in zip(_ALONG, (ranges, incidence), strict=True):
@@ -213,48 +243,17 @@ def _cells(assembly: Assembly) -> IntArray:
     return np.asarray(index.reshape(ranges.shape))
 
 
-def _mixed(readings: FloatArray) -> BoolArray:
-    """Return which readings (k, b - 6) lie well between the two sides of a jump, which both go on as they are.
+def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
+    """Return a mask (k, n) in which each column counts once in the scans from the same place; stand (k,).
 
-    By the readings alone: where a jump is moves with every error of the pose.
+    From one place, a beam as wide as it is meets the same two surfaces in every scan; so does a narrow face that an
+    error of the pose hides from the model.
     """
-    before, left, here, right, after = (readings[:, i : i - 6 or None] for i in (0, 1, 3, 5, 6))
-    with np.errstate(invalid="ignore", divide="ignore"):
-        jump = right - left
-        share = (here - left) / jump
-        flat = np.maximum(np.abs(left - before), np.abs(after - right)) < _FLAT * np.abs(jump)
-        return np.asarray((np.abs(jump) > _JUMP) & flat & (share > _INSIDE) & (share < 1 - _INSIDE))
-
-
-def _lasting(readings: FloatArray, stand: IntArray) -> BoolArray:
-    """Return which readings (k, b - 6) come again in the scan before or after from the same place; stand (k,).
-
-    What lies between two sides there is a narrow face that an error of the pose hides from the model: one face, but
-    counted in every scan. Mixed readings differ from scan to scan.
-    """
-    with np.errstate(invalid="ignore"):
-        same = np.abs(np.diff(readings[:, 3:-3], axis=0)) < _LASTS
-    same &= ((stand[1:] == stand[:-1]) & (stand[1:] >= 0))[:, np.newaxis]
-    out = np.zeros(readings[:, 3:-3].shape, dtype=bool)
-    out[1:] |= same
-    out[:-1] |= same
+    out = mask.copy()
+    for place in np.unique(stand[stand >= 0]):
+        rows = np.flatnonzero(stand == place)
+        out[rows[1:]] &= ~np.logical_or.accumulate(mask[rows[:-1]], axis=0)
     return out
-
-
-def _jumps(ranges: FloatArray, incidence: FloatArray) -> BoolArray:
-    """Return where (k, b - 6) a jump from one face to another is to be expected, and no narrow face lies between."""
-    narrow = _widened(_mixed(ranges))
-    with np.errstate(invalid="ignore"):
-        jump = np.abs(np.diff(np.where(incidence < _SQUARE, ranges, np.nan), axis=1)) > _JUMP
-    beside = np.zeros(ranges.shape, dtype=bool)
-    beside[:, 1:] |= jump
-    beside[:, :-1] |= jump
-    return np.asarray(_widened(beside)[:, 3:-3] & ~narrow)
-
-
-def _widened(mask: BoolArray) -> BoolArray:
-    """Return a mask (k, b) with some more beams on either side of each."""
-    return np.asarray(maximum_filter1d(mask, 2 * _BESIDE + 1, axis=1, mode="constant"))
 
 
 def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:

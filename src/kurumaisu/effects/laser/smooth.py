@@ -53,7 +53,8 @@ _PLACED = ("heading", "world_bearing", "hit_x", "hit_y")
 class SmoothRange(ReadingEffect):
     """A curve over a covariate, added to the mean; straight between knots, constant beyond the outer ones.
 
-    Where nobody knows the laser's pose, curves over it add nothing. Made by smooth_range_of.
+    A name that is not among RANGE_COVARIATES is a quantity measured beside the scans, as in Echoes.known. Where nobody
+    knows it, or the laser's pose, curves over it add nothing. Made by smooth_range_of.
     """
 
     stage = LaserStage.BIAS
@@ -77,9 +78,12 @@ class SmoothRange(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the curve."""
+        reads = RANGE_COVARIATES.get(self.covariate)
         if self.covariate in _PLACED and echoes.origins is None:
             return echoes
-        at = RANGE_COVARIATES[self.covariate](echoes)
+        if reads is None and self.covariate not in echoes.known:
+            return echoes
+        at = echoes.known[self.covariate] if reads is None else reads(echoes)
         added = np.interp(at, numbered(self.values, "knot", 0), numbered(self.values, "value", 0))
         return replace(echoes, mean=echoes.mean + added)
 
@@ -88,7 +92,7 @@ class SmoothRange(ReadingEffect):
 def smooth_range_of(name: str) -> type[SmoothRange] | None:
     """Return the effect of an id smooth.range.COVARIATE, None for another one."""
     match = _ID.fullmatch(name)
-    if match is None or match[1] not in RANGE_COVARIATES:
+    if match is None:
         return None
     text = f"an unknown effect changes the ranges with {match[1].replace('_', ' ')}"
     own = {"id": name, "covariate": match[1], "sentence": text, "oblique": match[1] == "incidence"}

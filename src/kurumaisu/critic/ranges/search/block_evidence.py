@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import logsumexp
 
+from kurumaisu import effects
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
@@ -21,17 +22,33 @@ _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
 _PRUNED = 3  # best sets with a block that are pruned
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
+_ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
 
 @dataclass(frozen=True)
 class SetWithBlock:
-    """A set of forms with a block beside it: log posterior, not normalised."""
+    """A set of forms with a block beside it: log posterior, not normalised.
+
+    form_of: the effect that its curve draws, in another form than the catalogue's.
+    """
 
     fit: FittedForms
     free: Block
     evidence: CurveEvidence
     log_posterior: float
+    form_of: str | None = None
+
+    @property
+    def unknown(self) -> bool:
+        """Whether the block is a curve that draws no effect of the catalogue."""
+        return self.free.basis is not None and self.form_of is None
+
+    @property
+    def ids(self) -> frozenset[str]:
+        """The effects of the catalogue that act in it."""
+        drawn = self.free.id if self.free.basis is None else self.form_of
+        return self.fit.ids if drawn is None else self.fit.ids | {drawn}
 
 
 @dataclass(frozen=True)
@@ -50,20 +67,18 @@ class BlockComparison:
     def least(self) -> float:
         """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
         nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
-        curve = next((rival.log_posterior for rival in self.rivals if rival.free.basis is not None), nothing)
+        curve = next((rival.log_posterior for rival in self.rivals if rival.unknown), nothing)
         return max(BEYOND, LEFT * (curve - nothing))
 
     @property
     def winner(self) -> SetWithBlock | None:
         """The block that acts, if any: a curve only if it is far better than the catalogue."""
-        if not self.rivals:
-            return None
-        best = self.rivals[0]
-        if best.free.basis is not None and self.lead <= self.least:
-            best = next((rival for rival in self.rivals if rival.free.basis is None), best)
-        if best.free.basis is not None:
-            return self._plainest(best) if self.lead > self.least else None
-        return best if best.log_posterior > self.found.best.score else None
+        curve = next((rival for rival in self.rivals if rival.unknown), None)
+        if curve is not None and self.lead > self.least:
+            return self._plainest(curve)
+        walls = next((rival for rival in self.rivals if rival.free.basis is None), None)
+        known = max([self.found.best.score, *(r.log_posterior for r in self.rivals if r.form_of is not None)])
+        return walls if walls is not None and walls.log_posterior > known else None
 
     def _plainest(self, best: SetWithBlock) -> SetWithBlock:
         """Return the curve of the best rival beside as few effects as explain much of what it explains.
@@ -88,9 +103,11 @@ def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray
     rivals.sort(key=lambda rival: -rival.log_posterior)
     rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
     rivals.sort(key=lambda rival: -rival.log_posterior)
+    singles = [fit for fit in found.fits if len(fit.forms) == 1 and effects.by_id(fit.forms[0].id).empirical]
+    rivals = [replace(rival, form_of=_form_of(rival, singles, gram)) for rival in rivals]
     plain = [(fit.ids, fit.score) for fit in found.fits]
-    plain += [(rival.fit.ids | {rival.free.id}, rival.log_posterior) for rival in rivals if rival.free.basis is None]
-    curved = [rival for rival in rivals if rival.free.basis is not None]
+    plain += [(rival.ids, rival.log_posterior) for rival in rivals if not rival.unknown]
+    curved = [rival for rival in rivals if rival.unknown]
     total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
     sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
     weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
@@ -154,6 +171,35 @@ def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, 
     n = len(fixed)
     fit = replace(rival.fit, coefficients=at[:n], sds=np.sqrt(np.diag(covariance)[:n]))
     return fit, at[n:], covariance[n:, n:]
+
+
+def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArray) -> str | None:
+    """Return the effect whose signal a curve draws beside its set, None of none; singles: effects alone, fitted.
+
+    A cause that follows another equation than the catalogue's is still that cause.
+    """
+    if rival.free.basis is None or rival.evidence.nats <= 0:
+        return None
+    drawn = np.zeros(len(gram) - 1)
+    drawn[rival.free.span] = fit_with_block(rival, gram)[1]
+    use = _use(rival.fit)
+    inner = gram[np.ix_(use, use)] + WEAK_PRIOR * np.eye(len(use))
+
+    def product(one: FloatArray, other: FloatArray) -> float:
+        across = np.linalg.solve(inner, gram[use, :-1] @ other) if len(use) else np.empty(0)
+        return float(one @ gram[:-1, :-1] @ other - (gram[use, :-1] @ one) @ across)
+
+    found: dict[str, float] = {}
+    for fit in singles:
+        (form,) = fit.forms
+        if form.id in rival.fit.ids:
+            continue
+        signal = np.zeros(len(drawn))
+        signal[form.span] = fit.coefficients
+        size = product(signal, signal) * product(drawn, drawn)
+        found[form.id] = max(product(drawn, signal) / np.sqrt(size) if size > 0 else 0.0, found.get(form.id, 0.0))
+    best = max(found, key=lambda name: found[name], default=None)
+    return best if best is not None and found[best] >= _ALIKE else None
 
 
 def block_size(rival: SetWithBlock, gram: FloatArray) -> tuple[float, float, float]:

@@ -129,10 +129,10 @@ def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatAr
     known = np.isfinite(marks.base)
     stand = stands_of(shots)
     jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
-    for name, of in effects.RANGE_COVARIATES.items():
-        at = np.asarray(of(echoes), dtype=float)
+    beside = {name: np.repeat(values[:, np.newaxis], known.shape[1], axis=1) for name, values in shots.known.items()}
+    for name, at in {**{name: of(echoes) for name, of in effects.RANGE_COVARIATES.items()}, **beside}.items():
         values = at[known]
-        if np.ptp(values) < _LEAST:
+        if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in beside else _LEAST):
             continue
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
         knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
