@@ -247,7 +247,7 @@ def slope(p, drive):
     for speed, w in zip(drive.v, drive.w, strict=True):
         middle = heading + w * drive.dt / 2
         uphill = p["climb_x"] * math.cos(middle) + p["climb_y"] * math.sin(middle)
-        twice = 2 * math.sqrt((50 * speed) ** 2 + (25 * w) ** 2)
+        twice = 2 * math.sqrt((50 * speed) ** 2 + (1 - p["driving"]) * (25 * w) ** 2)
         v.append(speed - uphill * (1 - 2 / (math.exp(min(twice, 700)) + 1)))
         heading += w * drive.dt
     return v, _still(len(v)), drive.w
@@ -267,9 +267,11 @@ def caster_reversal(p, drive):
             last_way = way
         travelled = abs(v) * drive.dt
         kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
-        out.append(w + kicked_to * kick)
+        backwards = round(p["by"]) == 1 and last_way < 0
+        out.append(w - kicked_to * kick if backwards else w + kicked_to * kick)
         since += travelled
-        sides = [*sides[1:], math.copysign(1.0, w) if abs(w) >= 0.05 else sides[-1]]
+        turned = math.copysign(1.0, w) if abs(w) >= 0.05 else sides[-1]
+        sides = [*sides[1:], 1.0 if round(p["by"]) == 2 else turned]
     return drive.v, _still(len(out)), out
 
 

@@ -70,7 +70,7 @@ def _saturation(p, b):
 
 
 def _quantisation(p, b):
-    reading = b.mean + b.sd * b.noise
+    reading = b.mean + b.sd * b.noise - p["cut"] * p["step"] / 2
     below = math.floor(reading / p["step"]) * p["step"]
     return below if reading - below < p["step"] / 2 else below + p["step"]
 

@@ -11,14 +11,14 @@ from laser_scene import recording
 from kurumaisu import effects
 from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, estimate_reading_noise
 from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.beams import gather, hits_of
 from kurumaisu.critic.ranges.scans.range_step import grid_step
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece
 from kurumaisu.critic.scatter.scatter_search import ScatterSearch, _weighed
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
-from kurumaisu.critic.scatter.statistics import Statistics, _lasting, _mixed, _spacing
+from kurumaisu.critic.scatter.statistics import Statistics, _Edges, _once, _spacing
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -187,28 +187,33 @@ def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
     assert len(assembly.thinned(left).shots.stamps) == len(left)
 
 
-def test_readings_between_two_sides_are_told_from_sides_and_slopes():
-    sides = np.array([[2.0] * 8 + [1.0] * 8])
-    assert not _mixed(sides).any()
-    one = sides.copy()
-    one[0, 8] = 1.4
-    assert np.flatnonzero(_mixed(one)[0]).tolist() == [8 - 3]
-    both = one.copy()
-    both[0, 7] = 1.7
-    assert np.flatnonzero(_mixed(both)[0]).tolist() == [7 - 3, 8 - 3]
-    assert not _mixed(np.linspace(1.0, 3.0, 16)[np.newaxis]).any(), "a slope is no jump"
-    one[0, 6] = np.nan
-    assert not _mixed(one).any(), "nobody knows whether that side goes on"
+def test_readings_of_no_surface_about_a_beam_are_told(tmp_path):
+    """Between both sides of an edge, clear of them: not what another pose sees, nor a slope, nor a nearer thing."""
+    assembly = _assembly(tmp_path)
+    edges = _Edges(assembly, np.full(assembly.residual.shape, 0.02))
+    here = np.zeros(assembly.residual.shape)
+    assert not edges.mixed(here).any()
+    rows, beams = edges._at
+    assert len(rows)
+    turned = hits_of(assembly.shots, (), 0, shift=np.array([0.0, 0.0, 0.003]), like=assembly.marks.seen).ranges
+    other = turned - assembly.marks.seen.ranges
+    assert (np.abs(other) > 0.15).any()
+    assert not edges.mixed(other).any()
+    near, far = (end - edges._base for end in edges._ends)
+    middle = here.copy()
+    middle[rows, beams] = np.where(far > 0.3, far / 2, near / 2)
+    found = edges.mixed(middle)
+    assert found[rows, beams].mean() > 0.5
+    assert not edges.mixed(middle + np.nan).any()
+    nearer = here.copy()
+    nearer[rows, beams] = near - 0.5
+    assert not edges.mixed(nearer).any()
 
 
-def test_a_narrow_face_that_stays_is_no_mixed_reading():
-    """From one place a face is read alike scan by scan; from another place, or a drive, alike means nothing."""
-    readings = np.tile([1.0] * 5 + [1.4] + [2.0] * 6, (6, 1))
-    readings[3:, 5] = [1.3, 1.7, 1.4]
-    stand = np.array([0, 0, 0, 1, 1, 1])
-    assert _mixed(readings)[:, 2].all()
-    assert _lasting(readings, stand)[:, 2].tolist() == [True, True, True, False, False, False]
-    assert not _lasting(readings, np.full(6, -1)).any()
+def test_what_is_read_scan_by_scan_from_one_place_counts_once():
+    mask = np.array([[1, 0], [1, 1], [0, 1], [1, 1], [1, 0], [1, 0]], dtype=bool)
+    stand = np.array([0, 0, 0, 1, -1, -1])
+    assert _once(mask, stand).astype(int).tolist() == [[1, 0], [0, 1], [0, 0], [1, 1], [1, 0], [1, 0]]
 
 
 def test_what_came_while_another_was_fitted_ill_goes_when_that_is_mended():

@@ -81,8 +81,9 @@ def test_a_curve_over_where_beams_hit_needs_the_pose():
     assert chain.read(echoes)[0] - 1 == pytest.approx(0.0075)
     with pytest.raises(Error, match="knots must increase"):
         effects.check((EffectSetting("smooth.range.range", {**values, "knot_1": -1.0}),))
-    with pytest.raises(Error, match="not in the catalogue"):
-        effects.by_id("smooth.range.moon")
+    moon = effects.build_laser((EffectSetting("smooth.range.moon", values),), np.random.default_rng(0))
+    assert moon.read(echoes)[0] == 1, "nobody has recorded it"
+    assert moon.read(replace(echoes, known={"moon": 1.0}))[0] - 1 == pytest.approx(0.005)
 
 
 def test_the_temperature_that_was_recorded_is_followed():

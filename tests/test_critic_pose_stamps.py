@@ -75,7 +75,7 @@ def test_true_stamps_are_no_fault(rate):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_gaps_while_the_robot_changes_its_speed_are_no_fault(seed):
-    """Of a reference that is lost where the robot stops or sets off: what it drove in the gap is not its usual speed."""
+    """Of a reference that is lost where the robot stops or sets off: in the gap it had another speed."""
     rng = np.random.default_rng(seed)
     pose = phased(rng, rate=50.0).pose
     speed = np.hypot(*np.diff(pose.values[:, :2], axis=0).T) * 50.0

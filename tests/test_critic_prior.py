@@ -82,10 +82,10 @@ def test_what_lags_but_is_no_slower_is_hardly_a_load():
 def test_what_has_a_direction_or_two_peculiarities_has_no_proportion(name, sizes):
     """A slope climbs in any direction, and one axis may be ramped without the other.
 
-    Either or both: three ways, and a ramp is fitted with round corners here, which three in ten have beforehand.
+    Either or both: three ways. Both are fitted in their other form here, which three in ten have beforehand.
     """
     cost, z = cost_of(name, sizes)
-    ways = 1 if name == "base.slope" else 3 / 0.3
+    ways = (1 if name == "base.slope" else 3) / 0.3
     assert cost == pytest.approx(float(prior.occam_plane(np.array(z))) + np.log(ways), abs=0.02)
 
 

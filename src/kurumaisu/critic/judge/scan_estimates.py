@@ -92,7 +92,7 @@ def with_cut_steps(
     if steps is None or shift is None or size is None:
         return tuple(causes), tuple(settings.values())
     half, sd = settings[_STEPS].parameters["step"] / 2, (size.hi90 - size.lo90) / (2 * NORMAL90)
-    cut = -float(np.sign(size.estimate))
+    cut = -1.0 if size.estimate > 0 else 1.0
     if abs(size.estimate + cut * half) > _SAME * sd or half < _SAME * sd:
         return tuple(causes), tuple(settings.values())
     whole = replace(steps, gain_nats=steps.gain_nats + shift.gain_nats)

@@ -149,7 +149,8 @@ class ScatterFit:
                 yield effect
 
     def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
-        return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in self._means]
+        known = self._means | {f"{effect.id}.{name}" for name in effect.usual()}
+        return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in known]
 
     def statistics(self, settings: Sequence[EffectSetting], seeds: Sequence[int]) -> FloatArray:
         """Return the statistics of simulations with effects, the mean over seeds."""

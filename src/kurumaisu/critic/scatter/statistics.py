@@ -191,7 +191,8 @@ class _Edges:
             jumps = np.abs(np.diff(ways, axis=0)) > _JUMP
         self._at = np.nonzero(jumps.any(axis=0) & np.isfinite(ways).all(axis=0))
         self._shape, self._clear = seen.ranges.shape, clear[self._at]
-        self._base, ways, jumps = assembly.marks.base[self._at], ways[(slice(None), *self._at)], jumps[(slice(None), *self._at)]
+        rows, beams = self._at
+        self._base, ways, jumps = assembly.marks.base[self._at], ways[:, rows, beams], jumps[:, rows, beams]
         # from the range met to the reading of it, which is nearly the same
         ways += self._base - seen.ranges[self._at]
         self._low, self._high = np.minimum(ways[1:], ways[:-1]), np.maximum(ways[1:], ways[:-1])
