@@ -15,14 +15,15 @@ from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
+from kurumaisu.effects import Echoes
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 # Share of the largest size that walls may be off by, beyond which all of them surely are of another map: of rooms about
 # as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
 _ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
-_SAME = 3.0  # sds of an offset within which it is half a step
-_STEPS, _SHIFT = "laser.quantisation", "laser.offset"
+_SAME = 3.0  # sds of a constant error within which it is another form's
+_RAMP, _ALIKE = 20000, 1e-4  # readings that show what an effect does; [m] by which near and far ones may differ
 _LACKS = 0.05  # share of readings of that part, at least
 
 
@@ -82,23 +83,51 @@ def with_scatter(
     return tuple(known.values()), tuple(out.values())
 
 
-def with_cut_steps(
+def with_shifting_forms(
     causes: Sequence[Cause], settings: Mapping[str, EffectSetting]
 ) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
-    """Return causes and settings with an offset of half a step taken for what it is: the remainder is cut off."""
-    known = {cause.id: cause for cause in causes}
-    steps, shift = known.get(_STEPS), known.get(_SHIFT)
-    size = shift.parameters.get("offset") if shift is not None else None
-    if steps is None or shift is None or size is None:
-        return tuple(causes), tuple(settings.values())
-    half, sd = settings[_STEPS].parameters["step"] / 2, (size.hi90 - size.lo90) / (2 * NORMAL90)
-    cut = -1.0 if size.estimate > 0 else 1.0
-    if abs(size.estimate + cut * half) > _SAME * sd or half < _SAME * sd:
-        return tuple(causes), tuple(settings.values())
-    whole = replace(steps, gain_nats=steps.gain_nats + shift.gain_nats)
-    setting = EffectSetting(_STEPS, {**settings[_STEPS].parameters, "cut": cut})
-    rest = tuple(whole if cause is steps else cause for cause in causes if cause is not shift)
-    return rest, tuple(setting if name == _STEPS else one for name, one in settings.items() if name != _SHIFT)
+    """Return causes and settings with a constant error taken for what it is: another cause's, in another form.
+
+    Where a remainder is cut off, say, readings are too short by half a step.
+    """
+    for cause in causes:
+        for form in effects.by_id(cause.id).forms[1:] if cause.id in settings else ():
+            usual, other = (_constant({**settings[cause.id].parameters, **each}, cause.id) for each in ({}, form))
+            if usual is None or other is None:
+                continue
+            for shift in causes:
+                if shift is not cause and _is_shift(shift, other - usual):
+                    setting = EffectSetting(cause.id, {**settings[cause.id].parameters, **form})
+                    whole = replace(cause, gain_nats=cause.gain_nats + shift.gain_nats)
+                    rest = {name: one for name, one in settings.items() if name != shift.id} | {cause.id: setting}
+                    return tuple(whole if one is cause else one for one in causes if one is not shift), (
+                        *rest.values(),
+                    )
+    return tuple(causes), tuple(settings.values())
+
+
+def _is_shift(cause: Cause, by: float) -> bool:
+    """Tell whether a cause is a constant error [m] that is as large as this one, and is surely none of 0."""
+    ends = [_constant({n: getattr(e, end) for n, e in cause.parameters.items()}, cause.id) for end in ("lo90", "hi90")]
+    low, high = ends
+    if low is None or high is None:
+        return False
+    sd = abs(high - low) / (2 * NORMAL90)
+    return abs(0.5 * (low + high) - by) < _SAME * sd < abs(by)
+
+
+def _constant(values: Mapping[str, float], name: str) -> float | None:
+    """Return by how much [m] an effect moves readings on the mean, all alike but for its steps; None of any other."""
+    effect = effects.by_id(name)
+    if effect.random or not issubclass(effect, effects.ReadingEffect):
+        return None
+    nulls = {p.name: p.null for p in effect.parameters}
+    ranges = np.linspace(1.0, 3.0, _RAMP)
+    none = np.zeros(_RAMP)
+    echoes = Echoes(0.0, none, ranges, none, none + 1, ranges, none, none, ranges)
+    chain = effects.build_laser((EffectSetting(name, {**nulls, **values}),), np.random.default_rng(0))
+    moved = (chain.read(echoes) - ranges).reshape(2, -1).mean(axis=1)
+    return float(moved.mean()) if abs(moved[0] - moved[1]) < _ALIKE else None
 
 
 def _off_null(setting: EffectSetting) -> dict[str, float]:

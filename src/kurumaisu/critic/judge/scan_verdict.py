@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge.clock_drift import without_double_delay
-from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_cut_steps, with_scatter
+from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter, with_shifting_forms
 from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, material, open_set, scatter_effects
@@ -205,7 +205,7 @@ def _finding(
     small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
     causes, added = with_scatter(causes, settings, scatter)
-    causes, added = with_cut_steps(causes, {setting.id: setting for setting in added})
+    causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added})
     confounded += tuple(group for group in map(open_set, scatter) if group)
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kurumaisu import effects
-from kurumaisu.critic.judge.scan_estimates import with_cut_steps
+from kurumaisu.critic.judge.scan_estimates import with_shifting_forms
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.effects import Echoes
 from kurumaisu.params import EffectSetting
@@ -22,7 +22,7 @@ def told(step, offset, half=1e-4):
         STEPS: EffectSetting(STEPS, {"step": step, "cut": 0.0}),
         SHIFT: EffectSetting(SHIFT, {"offset": offset}),
     }
-    return with_cut_steps(causes, settings)
+    return with_shifting_forms(causes, settings)
 
 
 @pytest.mark.parametrize(("offset", "cut"), [(-0.00345, 1.0), (0.0034, -1.0)])
