@@ -19,6 +19,7 @@ from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
+from kurumaisu.critic.ranges.scans.sweep_time import with_sweep_time
 from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.sanity import examination, masks
 from kurumaisu.critic.values.criticism import Criticism
@@ -53,7 +54,7 @@ def criticise(
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
     if wrong:
         return explain.invalid(recording, model, wrong)
-    recording = bounded(recording)
+    recording = with_sweep_time(bounded(recording), model)
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")

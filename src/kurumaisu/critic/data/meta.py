@@ -100,7 +100,9 @@ def _file(top: settings.Section, key: str, folder: Path, package_folder: str) ->
 
 def _laser(section: settings.Section) -> LaserMount:
     numbers = {name: section.number(name) for name in ("x", "y", "yaw", "angle_min", "angle_increment")}
-    laser = LaserMount(**numbers, beams=section.integer("beams", at_least=1, at_most=MOST_BEAMS))
+    beams = section.integer("beams", at_least=1, at_most=MOST_BEAMS)
+    time = section.number("time_increment", at_least=0.0) if "time_increment" in section else None
+    laser = LaserMount(**numbers, beams=beams, time_increment=time)
     section.end()
     return laser
 

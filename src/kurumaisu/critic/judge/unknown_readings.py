@@ -40,7 +40,9 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
             continue
         seen.add(rival.free.id)
         p = min(weighed.p[rival.free.id], 1.0)
-        yield Unknown(UNKNOWN_CHANNEL, basis.covariate.replace("_", " "), shape(rival, basis, gram), p)
+        column = basis.covariate not in effects.RANGE_COVARIATES  # called as the recording calls it
+        name = basis.covariate if column else basis.covariate.replace("_", " ")
+        yield Unknown(UNKNOWN_CHANNEL, name, shape(rival, basis, gram), p)
 
 
 def shape(rival: SetWithBlock, basis: Basis, gram: FloatArray) -> str:

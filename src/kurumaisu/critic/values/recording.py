@@ -79,7 +79,7 @@ def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict
 
 @dataclass(frozen=True)
 class LaserMount:
-    """Nominal mounting base_from_laser [m, rad] and the fan [rad]."""
+    """Nominal mounting base_from_laser [m, rad], the fan [rad], and the time between its beams [s], if known."""
 
     x: float
     y: float
@@ -87,6 +87,7 @@ class LaserMount:
     angle_min: float
     angle_increment: float
     beams: int
+    time_increment: float | None = None
 
 
 @dataclass(frozen=True)

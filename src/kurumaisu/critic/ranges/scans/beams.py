@@ -157,6 +157,7 @@ def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Las
             angle_min=mount.angle_min,
             angle_increment=mount.angle_increment,
             beams=mount.beams,
+            time_increment=laser.time_increment if mount.time_increment is None else mount.time_increment,
         )
     known = next((run.fan for run in runs if run.fan is not None), None)
     if known is not None:

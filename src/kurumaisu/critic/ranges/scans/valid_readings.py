@@ -12,7 +12,7 @@ from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
 from kurumaisu.types import BoolArray, FloatArray
 
 _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
-_BESIDE = 4  # beams on each side of a corner or jump: an error of the pose or the mounting moves it so far
+_BESIDE = 0.025  # [rad] on each side of a corner or jump, a beam at least: errors of pose or mounting move it so far
 # [rad] oblique beyond this, a beam slides along the wall with every error of the pose, which then acts by its square,
 # too; and what becomes of a footprint four times as long as wide is another equation for everybody.
 _STEEPEST = np.radians(75.0)
@@ -33,7 +33,7 @@ def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
     jump = ~(near > 0)
     jump[:, [0, -1]] = True  # nobody sees what lies beyond
     jump[:, 1:-1] |= np.abs(near[:, 2:] + near[:, :-2] - 2 * np.cos(increment) * middle) > _KINK * middle
-    beside = _BESIDE + reach * maximum_filter1d(np.nan_to_num(near), 3, axis=1) / increment
+    beside = np.maximum(_BESIDE / increment, 1.0) + reach * maximum_filter1d(np.nan_to_num(near), 3, axis=1) / increment
     wide = jump.copy()
     for shift in range(1, int(min(beside[jump].max(), jump.shape[1] - 1)) + 1):
         far = jump & (beside >= shift)
