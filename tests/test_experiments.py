@@ -237,6 +237,31 @@ def test_nothing_is_published_while_time_stands(run):
     assert run.go(0.1)[0, 1] > 0
 
 
+def test_no_phase_begins_before_the_chair_obeys(run):
+    def rates(seconds, heard):
+        out = []
+        for _ in range(round(seconds * 100)):
+            run.now += 0.01
+            for source in ("ground_truth", "odom"):
+                run.supervisor.see(source, run.now, np.zeros(3))
+            out.append(run.supervisor.tick(run.now, heard=heard))
+        return [said for said in out if said is not None]
+
+    deaf = rates(CARE.rest_time + 5.0, heard=False)
+    assert deaf
+    assert not np.any(deaf)
+    assert np.any(rates(CARE.lead_time + 3.0, heard=True))
+
+
+def test_a_chair_that_never_obeys_is_given_up(run):
+    for _ in range(round(300 * (2 * CARE.patience + 5))):
+        run.now += 0.01
+        for source in ("ground_truth", "odom"):
+            run.supervisor.see(source, run.now, np.zeros(3))
+        run.supervisor.tick(run.now, heard=False)
+    assert "nobody obeys" in run.supervisor.outcome
+
+
 @pytest.mark.parametrize(("leap", "why"), [(5.0, "time jumped by 5.01 s"), (-5.0, "time ran backwards")])
 def test_a_clock_that_jumps_stops_it(run, leap, why):
     run.go(2.0)

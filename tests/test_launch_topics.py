@@ -33,6 +33,7 @@ FOR_PEOPLE = {
     "laser_status",
     "map",
     "map_metadata",
+    "move_base_simple/goal",
     "mapping_node/entropy",
     "mapping_node/pose",
     "mapping_node/trajectory_with_covariance",

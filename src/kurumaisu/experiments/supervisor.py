@@ -120,8 +120,11 @@ class Supervisor:
             self._end = np.inf
             self.stage = Progress.ENDED if self.stage is Progress.WAITING else Progress.STOPPING
 
-    def tick(self, now: float) -> tuple[float, ...] | None:
-        """Return what to publish at a time [s], or None for nothing: not due, time stands, not begun, or ended."""
+    def tick(self, now: float, *, heard: bool = True) -> tuple[float, ...] | None:
+        """Return what to publish at a time [s], or None for nothing: not due, time stands, not begun, or ended.
+
+        heard: whether the chair obeys; until it does, rest is commanded, and then for as long as before any drive.
+        """
         if now == self._last:
             return None
         self._watch_clock(now)
@@ -129,6 +132,10 @@ class Supervisor:
             self._wait(now)
         elif self.stage is Progress.RUNNING:
             self._watch_poses(now)
+            if not heard and now < self._begin:
+                self._begin = now + self._care.lead_time
+                if self._first is not None and now - self._first > 2 * self._care.patience:
+                    self.stop("nobody obeys: is the chair locked or stopped?")
         if self.stage in (Progress.WAITING, Progress.ENDED) or now < self._due - _SAME:
             return None
         self._due = max(self._due + 1 / self._care.rate, now)

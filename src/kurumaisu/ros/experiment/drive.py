@@ -70,6 +70,7 @@ class _Driver:
         self._reference = model.reference_voltage
         kind = Voltages if topic == VOLTAGE else Twist
         self._publisher = rospy.Publisher(topic, kind, queue_size=1, tcp_nodelay=True)
+        self._heard = False  # by base_node, which obeys nobody who commands before it has seen him at rest
         self._message: Callable[[tuple[float, ...]], Twist | Voltages] = _twist if kind is Twist else self._voltages
         for source in ground.sources():
             subscribe(
@@ -81,13 +82,14 @@ class _Driver:
 
     def run(self, stop: Callable[[], bool]) -> str:
         """Publish until the supervisor has ended; return its outcome."""
+        obeys = self._message is _twist and bool(publishers(ACTIVE))
         deadline = np.inf
         while self._supervisor.stage is not Progress.ENDED and time.monotonic() < deadline:
             if stop() and deadline == np.inf:
                 deadline = time.monotonic() + _LATE
                 self._stop("interrupted")
             with self._lock:
-                said = self._supervisor.tick(rospy.get_time())
+                said = self._supervisor.tick(rospy.get_time(), heard=self._heard or not obeys)
             if said is not None:
                 self._publish(said)
             time.sleep(_GLANCE)
@@ -114,6 +116,7 @@ class _Driver:
             self._stop(f"{caller} also commands the chair")
 
     def _yield(self, message: String) -> None:
+        self._heard |= message.data == INPUT
         if message.data not in ("", INPUT):
             self._stop(f"{message.data} also commands the chair")
 
