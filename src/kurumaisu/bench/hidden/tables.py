@@ -68,7 +68,7 @@ def write_case(folder: Path, recording: Recording, truth: Truth | None = None, d
         write_whole({folder / recording.world.name: recording.world.read_text(encoding="utf-8")})
         meta["world"] = recording.world.name
     if recording.laser is not None:
-        meta["laser"] = asdict(recording.laser)
+        meta["laser"] = recording.laser.known
     if recording.truth is not None:
         meta["truth"] = dict(zip(("position_sd", "heading_sd"), recording.truth, strict=True))
     write_whole({folder / "meta.yaml": yaml.safe_dump(meta)})

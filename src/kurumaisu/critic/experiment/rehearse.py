@@ -68,7 +68,7 @@ def write(folder: Path, recording: Recording) -> None:
         name = run.name if len(recording.runs) == 1 else f"{recording.name}_{run.name}"
         write_csv_run(folder / name, run)
     laser, truth = recording.laser, recording.truth
-    meta: dict[str, object] = {} if laser is None else {"laser": vars(laser)}
+    meta: dict[str, object] = {} if laser is None else {"laser": laser.known}
     if truth is not None:
         meta["truth"] = {"position_sd": truth[0], "heading_sd": truth[1]}
     write_whole({folder / "meta.yaml": yaml.safe_dump(meta, sort_keys=False)})

@@ -89,6 +89,11 @@ class LaserMount:
     beams: int
     time_increment: float | None = None
 
+    @property
+    def known(self) -> dict[str, float | int]:
+        """Return what is known of it, as meta.yaml has it."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
 
 @dataclass(frozen=True)
 class Recording:
