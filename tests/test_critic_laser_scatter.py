@@ -188,26 +188,24 @@ def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
 
 
 def test_readings_of_no_surface_about_a_beam_are_told(tmp_path):
-    """Between both sides of an edge, clear of them: not what another pose sees, nor a slope, nor a nearer thing."""
+    """Between both sides of an edge, clear of them: not what another pose sees, a nearer thing, or a longer scale."""
     assembly = _assembly(tmp_path)
-    edges = _Edges(assembly, np.full(assembly.residual.shape, 0.02))
-    here = np.zeros(assembly.residual.shape)
-    assert not edges.mixed(here).any()
-    rows, beams = edges._at
-    assert len(rows)
+    still = np.zeros(assembly.residual.shape)
+    edges = _Edges(assembly, still + 0.002, still + 0.01)
+    base = assembly.marks.base
+    assert not edges.mixed(base).any()
+    assert not edges.mixed(1.006 * base).any()
     turned = hits_of(assembly.shots, (), 0, shift=np.array([0.0, 0.0, 0.003]), like=assembly.marks.seen).ranges
-    other = turned - assembly.marks.seen.ranges
-    assert (np.abs(other) > 0.15).any()
+    other = base + turned - assembly.marks.seen.ranges
+    assert (np.abs(other - base) > 0.15).any()
     assert not edges.mixed(other).any()
-    near, far = (end - edges._base for end in edges._ends)
-    middle = here.copy()
-    middle[rows, beams] = np.where(far > 0.3, far / 2, near / 2)
-    found = edges.mixed(middle)
-    assert found[rows, beams].mean() > 0.5
-    assert not edges.mixed(middle + np.nan).any()
-    nearer = here.copy()
-    nearer[rows, beams] = near - 0.5
+    at, (near, far) = edges._at, edges._ends
+    middle, nearer = base.copy(), base.copy()
+    middle[at] = 0.5 * (near + far)
+    assert edges.mixed(middle)[at].mean() > 0.5
+    nearer[at] = near - 0.5
     assert not edges.mixed(nearer).any()
+    assert not edges.mixed(np.full_like(base, np.nan)).any()
 
 
 def test_what_is_read_scan_by_scan_from_one_place_counts_once():

@@ -16,6 +16,7 @@ from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_en
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, fluctuating, steepest
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _ALONG = ("range", "incidence")  # in whose order readings are grouped, from near to far and from straight to oblique
@@ -80,7 +81,7 @@ class Statistics:
         limit = steepest(seen.level, seen.incidence)[:, :, axes]
         self._moves = np.clip(self._basis, -limit, limit)
         self._reach = np.sqrt(np.sum((self._moves[:, :, 1:] * self._size[:, np.newaxis, 1:]) ** 2, axis=2))
-        self._edges = _Edges(assembly, _CLEAR * self._sd + self._reach + _FINE)
+        self._edges = _Edges(assembly, self._sd, self._reach + _FINE)
         self._fits: dict[tuple[float, float], ScanFit] = {}
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
@@ -110,7 +111,7 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_once(self._edges.mixed(np.where(np.isfinite(readings), error, np.nan)), self._stand)))
+        out.append(_share(_once(self._edges.mixed(readings), self._stand)))
         return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def names(self) -> list[str]:
@@ -181,8 +182,8 @@ class Statistics:
 class _Edges:
     """Where beams pass the edge of a surface, and which readings there are of no surface at all."""
 
-    def __init__(self, assembly: Assembly, clear: FloatArray) -> None:
-        """Take the geometry; clear (k, b) [m]: from a surface, beyond which a reading is not of it."""
+    def __init__(self, assembly: Assembly, sd: FloatArray, reach: FloatArray) -> None:
+        """Take the geometry; sd (k, b) [m] of readings; reach (k, b) [m]: of errors of the poses."""
         shots, seen = assembly.shots, assembly.marks.seen
         count = round(_ASIDE * _FINELY)
         turns = abs(shots.laser.angle_increment) / _FINELY * np.arange(-count, count + 1)
@@ -190,7 +191,8 @@ class _Edges:
         with np.errstate(invalid="ignore"):
             jumps = np.abs(np.diff(ways, axis=0)) > _JUMP
         self._at = np.nonzero(jumps.any(axis=0) & np.isfinite(ways).all(axis=0))
-        self._shape, self._clear = seen.ranges.shape, clear[self._at]
+        self._shape, self._sd, self._reach = seen.ranges.shape, sd[self._at], reach[self._at]
+        self._trust, self._all = assembly.geometry, assembly.marks.base
         rows, beams = self._at
         self._base, ways, jumps = assembly.marks.base[self._at], ways[:, rows, beams], jumps[:, rows, beams]
         # from the range met to the reading of it, which is nearly the same
@@ -199,13 +201,18 @@ class _Edges:
         self._low, self._high = np.where(jumps, ways[1:], self._low), np.where(jumps, ways[1:], self._high)
         self._ends = ways.min(axis=0), ways.max(axis=0)
 
-    def mixed(self, error: FloatArray) -> BoolArray:
-        """Return which readings (k, b) lie between the surfaces about their beam, clear of each; error [m]: of them."""
-        said = self._base + error[self._at]
+    def mixed(self, readings: FloatArray) -> BoolArray:
+        """Return which readings (k, b) [m] lie between the surfaces about their beam, clear of each.
+
+        What errors on the mean move all readings by counts as their scatter: at an edge nobody can tell them.
+        """
+        said, off = readings[self._at], np.abs(readings - self._all)[self._trust]
+        usual = SIGMA_PER_MAD * float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else 0.0
         near, far = self._ends
+        clear = self._reach + _CLEAR * np.maximum(self._sd, usual)
         with np.errstate(invalid="ignore"):
-            met = ((said > self._low - self._clear) & (said < self._high + self._clear)).any(axis=0)
-            between = (said > near + self._clear) & (said < far - self._clear) & ~met
+            met = ((said > self._low - clear) & (said < self._high + clear)).any(axis=0)
+            between = (said > near + clear) & (said < far - clear) & ~met
         out = np.zeros(self._shape, dtype=bool)
         out[self._at] = between
         return out

@@ -22,7 +22,7 @@ from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior
 EffectSet = frozenset[Candidate]
 _WIDTH = 3  # sets that are gone on from in a round
 _NEAR = 8.0  # [nat] behind the best set within which one is gone on from
-_ADDED = 7  # proposals beside a set
+_ADDED = 8  # proposals beside a set, forms of one effect among them
 _BESIDE_CURVE = 2  # of these, what is proposed beside the best curve
 _SURELY = 4  # of those, tried however little they promise: what an equation misses is not in the promise
 _SWAPPED = 4  # and in the place of each of its effects
