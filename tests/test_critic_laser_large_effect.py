@@ -25,7 +25,7 @@ def made(tmp_path_factory):
     second = replace(
         first,
         name="later",
-        pose=replace(first.pose, t=first.pose.t + LATER),
+        pose=replace(first.pose, t=first.pose.t + LATER, values=first.pose.values + 1e-6),  # measured anew
         scan=replace(first.scan, t=first.scan.t + LATER),
     )
     return replace(data, runs=(first, second), train=("drive", "later"))
