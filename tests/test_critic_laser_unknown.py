@@ -4,6 +4,7 @@
 import json
 from dataclasses import replace
 
+import laser_scene
 import numpy as np
 import pytest
 from laser_scene import recording
@@ -16,6 +17,7 @@ from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_pr
 from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
 from kurumaisu.critic.ranges.poses.likeliest_path import PoseEvidence, likeliest_path, motion_evidence
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged
+from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.effects import Echoes
@@ -229,3 +231,29 @@ def test_a_chair_that_was_carried_has_not_jumped(pause, jumps):
     times[20:] += pause
     places = np.repeat([[0.0, 0.0, 0.0], [1.5, 0.5, 1.0]], 20, axis=0) + 0.0005 * rng.standard_normal((40, 3))
     assert bool(pose_jumps.problems(Series(times, places, ("x", "y", "theta")))) == jumps
+
+
+def test_what_follows_a_recorded_column_is_told_over_it(tmp_path):
+    """The pressure of a tyre goes up and down; nothing in the catalogue follows it."""
+    data = recording(tmp_path, None, 0.0, 7, scans=30)
+    (run,) = data.runs
+    pressure = 2.5 + 0.2 * np.sin(1.1 * np.arange(len(run.scan.t)) ** 1.3)
+    scan = replace(run.scan, values=run.scan.values + 0.02 * (pressure - 2.5)[:, np.newaxis])
+    known = {"tyre_pressure": Series(run.scan.t, pressure[:, np.newaxis], ("tyre_pressure",))}
+    found = criticise_scans(replace(data, runs=(replace(run, scan=scan, covariates=known),)), MODEL, say)
+    assert found.unknown[0].covariate == "tyre_pressure"
+    assert "rad" not in found.unknown[0].shape, "nobody knows its unit"
+    assert found.causes == ()
+
+
+def test_a_curve_that_draws_an_effect_is_that_effect_in_another_form(tmp_path, monkeypatch):
+    """Oblique walls are read longer by the square of the angle: the footprint of the catalogue is another equation."""
+
+    def by_the_square(effect, size, r, incidence, *_):
+        return 1.004587 * r + 0.058826 + size * incidence**2
+
+    monkeypatch.setattr(laser_scene, "mean_reading", by_the_square)
+    data = recording(tmp_path, "laser.incidence_bias", 0.01, 9, scans=30)
+    assert [cause.id for cause in criticise_scans(data, MODEL, say).causes] == ["laser.incidence_bias"]
+    monkeypatch.setattr(block_evidence, "_ALIKE", 2.0)  # no curve draws any
+    assert criticise_scans(data, MODEL, say).unknown[0].covariate == "incidence"

@@ -166,14 +166,14 @@ def test_rows_that_repeat_a_stretch_are_found_and_standing_still_is_not():
 
 
 def test_a_run_that_is_another_one_once_more_is_said():
-    rng = np.random.default_rng(7)
+    rng, marks = np.random.default_rng(7), sanity_rows.marks
     rows = np.cumsum(rng.normal(size=(60, 3)), axis=0)
     pose, later = (Series(np.arange(60) / 10 + start, rows, ("x", "y", "theta")) for start in (0.0, 100.0))
-    assert sanity_rows.copied(later, pose)
+    assert sanity_rows.copied(marks(later), marks(pose))
     again = Series(pose.t, rows + 1e-6 * rng.normal(size=rows.shape), pose.columns)
-    assert not sanity_rows.copied(again, pose)
+    assert not sanity_rows.copied(marks(again), marks(pose))
     still = Series(pose.t, np.tile(rows[:1], (60, 1)), pose.columns)
-    assert not sanity_rows.copied(still, still)
+    assert not sanity_rows.copied(marks(still), marks(still))
 
 
 def test_nothing_is_wrong_with_a_real_bag():

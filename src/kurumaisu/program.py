@@ -24,16 +24,16 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f"there is no {str(value)!r}; {hint(str(value), known)}")
 
 
+def text_parser(name: str, about: str, epilog: str, **more: Any) -> Parser:
+    """Return a parser whose help has its texts as they are, and whose options have no short cuts."""
+    form = argparse.RawDescriptionHelpFormatter
+    return Parser(prog=name, description=about, epilog=epilog, formatter_class=form, allow_abbrev=False, **more)
+
+
 def node_parser(name: str, text: str) -> Parser:
     """Return the parser of a node. text: a paragraph on what it does; then topics, services, parameters."""
     about, _, names = text.strip().partition("\n\n")
-    return Parser(
-        prog=name,
-        description=about,
-        epilog=f"{names}\n\n{_ROS}".strip(),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    return text_parser(name, about, f"{names}\n\n{_ROS}".strip())
 
 
 def words(arguments: Sequence[str] | None = None) -> list[str]:

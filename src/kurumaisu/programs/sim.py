@@ -115,13 +115,8 @@ def _constant(options: argparse.Namespace) -> FloatArray:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = program.Parser(
-        prog="kurumaisu sim",
-        description="Drive the simulated chair by commands, and write what was measured as a recording.",
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    about = "Drive the simulated chair by commands, and write what was measured as a recording."
+    parser = program.text_parser("kurumaisu sim", about, _EPILOG)
     add = parser.add_argument
     usual = "of this package, worlds/arena.world"
     add("world", type=Path, nargs="?", default=shipped("worlds/arena.world"), metavar="FILE", help=f"world ({usual})")

@@ -57,10 +57,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 
 def _parser() -> argparse.ArgumentParser:
-    form = argparse.RawDescriptionHelpFormatter
-    parser = program.Parser(
-        prog="critic", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
-    )
+    parser = program.text_parser("critic", _DESCRIPTION, _EPILOG)
     add = parser.add_argument
     what = "a bag, a folder of runs or CSV tables, a log of MRPT or CARMEN, or a folder of such recordings"
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)

@@ -57,12 +57,14 @@ def examine(recording: Recording, model: Model) -> Faults:
 
 def _copies(recording: Recording) -> Iterator[tuple[Run, str]]:
     """Yield the runs that are another run once more, with words for it."""
-    measured = [(run, run.pose) for run in recording.runs if run.pose is not None and run.pose_source == "measured"]
-    for i, (run, pose) in enumerate(measured):
-        for other, earlier in measured[:i]:
-            if rows.copied(pose, earlier):
-                yield run, f"has the poses of {other.name}, to the last bit: a copy; leave one of them out"
-                break
+    known: dict[str, set[bytes]] = {}
+    for run in recording.runs:
+        if run.pose is not None and run.pose_source == "measured":
+            own = rows.marks(run.pose)
+            other = next((name for name, earlier in known.items() if rows.copied(own, earlier)), None)
+            if other is not None:
+                yield run, f"has the poses of {other}, to the last bit: a copy; leave one of them out"
+            known[run.name] = own
 
 
 def _segments(recording: Recording) -> FloatArray | None:

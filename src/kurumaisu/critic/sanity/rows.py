@@ -42,11 +42,14 @@ def frozen(pose: Series, asked: Rates, driven: Rates) -> str | None:
     )
 
 
-def copied(pose: Series, earlier: Series) -> bool:
-    """Tell whether poses are those of an earlier run once more: measured again, none is the same to the last bit."""
-    own, other = (np.round(each.values[1:, :3][~_still(each)], _DECIMALS) for each in (pose, earlier))
-    known = {row.tobytes() for row in other}
-    return len(own) >= _COPIED and sum(row.tobytes() in known for row in own) > len(own) / 2
+def marks(pose: Series) -> set[bytes]:
+    """Return the poses of a robot that moves, each as what tells it from all others."""
+    return {row.tobytes() for row in np.round(pose.values[1:, :3][~_still(pose)], _DECIMALS)}
+
+
+def copied(own: set[bytes], earlier: set[bytes]) -> bool:
+    """Tell by their marks whether poses are an earlier run's: measured again, none is the same to the last bit."""
+    return len(own) >= _COPIED and len(own & earlier) > len(own) / 2
 
 
 def _still(pose: Series) -> BoolArray:

@@ -191,14 +191,13 @@ class _Edges:
         with np.errstate(invalid="ignore"):
             jumps = np.abs(np.diff(ways, axis=0)) > _JUMP
         self._at = np.nonzero(jumps.any(axis=0) & np.isfinite(ways).all(axis=0))
-        self._shape, self._sd, self._reach = seen.ranges.shape, sd[self._at], reach[self._at]
-        self._trust, self._all = assembly.geometry, assembly.marks.base
+        self._sd, self._reach = sd[self._at], reach[self._at]
+        self._trust, self._base = assembly.geometry, assembly.marks.base
         rows, beams = self._at
-        self._base, ways, jumps = assembly.marks.base[self._at], ways[:, rows, beams], jumps[:, rows, beams]
-        # from the range met to the reading of it, which is nearly the same
-        ways += self._base - seen.ranges[self._at]
-        self._low, self._high = np.minimum(ways[1:], ways[:-1]), np.maximum(ways[1:], ways[:-1])
-        self._low, self._high = np.where(jumps, ways[1:], self._low), np.where(jumps, ways[1:], self._high)
+        # of the ranges met, the readings, which are nearly the same
+        ways = ways[:, rows, beams] + (self._base - seen.ranges)[self._at]
+        one, other = ways[1:], np.where(jumps[:, rows, beams], ways[1:], ways[:-1])
+        self._low, self._high = np.minimum(one, other), np.maximum(one, other)
         self._ends = ways.min(axis=0), ways.max(axis=0)
 
     def mixed(self, readings: FloatArray) -> BoolArray:
@@ -206,14 +205,14 @@ class _Edges:
 
         What errors on the mean move all readings by counts as their scatter: at an edge nobody can tell them.
         """
-        said, off = readings[self._at], np.abs(readings - self._all)[self._trust]
+        said, off = readings[self._at], np.abs(readings - self._base)[self._trust]
         usual = SIGMA_PER_MAD * float(np.median(off[np.isfinite(off)])) if np.isfinite(off).any() else 0.0
         near, far = self._ends
         clear = self._reach + _CLEAR * np.maximum(self._sd, usual)
         with np.errstate(invalid="ignore"):
             met = ((said > self._low - clear) & (said < self._high + clear)).any(axis=0)
             between = (said > near + clear) & (said < far - clear) & ~met
-        out = np.zeros(self._shape, dtype=bool)
+        out = np.zeros(readings.shape, dtype=bool)
         out[self._at] = between
         return out
 

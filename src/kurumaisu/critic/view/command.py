@@ -150,13 +150,7 @@ def port_number(text: str) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = program.Parser(
-        prog="view",
-        description="Look at a recording in the browser, moment by moment.",
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
+    parser = program.text_parser("view", "Look at a recording in the browser, moment by moment.", _EPILOG)
     add = parser.add_argument
     add("recording", type=Path, metavar="RECORDING", help="a bag, a folder of runs or CSV tables, or an MRPT rawlog")
     add("--report", type=Path, metavar="FOLDER", help="what the critic wrote (criticism or report in the recording)")

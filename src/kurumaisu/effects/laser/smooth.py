@@ -78,12 +78,12 @@ class SmoothRange(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by the curve."""
-        reads = RANGE_COVARIATES.get(self.covariate)
         if self.covariate in _PLACED and echoes.origins is None:
             return echoes
-        if reads is None and self.covariate not in echoes.known:
+        reads = RANGE_COVARIATES.get(self.covariate)
+        at = echoes.known.get(self.covariate) if reads is None else reads(echoes)
+        if at is None:
             return echoes
-        at = echoes.known[self.covariate] if reads is None else reads(echoes)
         added = np.interp(at, numbered(self.values, "knot", 0), numbered(self.values, "value", 0))
         return replace(echoes, mean=echoes.mean + added)
 

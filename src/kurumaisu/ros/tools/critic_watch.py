@@ -240,10 +240,7 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    form = argparse.RawDescriptionHelpFormatter
-    parser = program.Parser(
-        prog="critic watch", description=_DESCRIPTION, epilog=_EPILOG, formatter_class=form, allow_abbrev=False
-    )
+    parser = program.text_parser("critic watch", _DESCRIPTION, _EPILOG)
     add = parser.add_argument
     add("--window", type=whole_number, default=120, metavar="S", help="seconds of driving to judge by (120)")
     add("--every", type=whole_number, default=30, metavar="S", help="seconds from one criticism to the next (30)")

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from kurumaisu import effects
@@ -22,6 +23,7 @@ _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
 _PRUNED = 3  # best sets with a block that are pruned
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
+_NEAR = 30.0  # [nat] behind the likeliest, beyond which nobody asks what a curve draws
 _ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
@@ -104,7 +106,8 @@ def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray
     rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
     rivals.sort(key=lambda rival: -rival.log_posterior)
     singles = [fit for fit in found.fits if len(fit.forms) == 1 and effects.by_id(fit.forms[0].id).empirical]
-    rivals = [replace(rival, form_of=_form_of(rival, singles, gram)) for rival in rivals]
+    near = rivals[0].log_posterior - _NEAR if rivals else 0.0
+    rivals = [replace(r, form_of=_form_of(r, singles, gram)) if r.log_posterior > near else r for r in rivals]
     plain = [(fit.ids, fit.score) for fit in found.fits]
     plain += [(rival.ids, rival.log_posterior) for rival in rivals if not rival.unknown]
     curved = [rival for rival in rivals if rival.unknown]
@@ -180,26 +183,19 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
     """
     if rival.free.basis is None or rival.evidence.nats <= 0:
         return None
-    drawn = np.zeros(len(gram) - 1)
-    drawn[rival.free.span] = fit_with_block(rival, gram)[1]
-    use = _use(rival.fit)
-    inner = gram[np.ix_(use, use)] + WEAK_PRIOR * np.eye(len(use))
-
-    def product(one: FloatArray, other: FloatArray) -> float:
-        across = np.linalg.solve(inner, gram[use, :-1] @ other) if len(use) else np.empty(0)
-        return float(one @ gram[:-1, :-1] @ other - (gram[use, :-1] @ one) @ across)
-
-    found: dict[str, float] = {}
+    drawn, own = fit_with_block(rival, gram)[1], np.arange(rival.free.span.start, rival.free.span.stop)
+    alike = []
     for fit in singles:
         (form,) = fit.forms
         if form.id in rival.fit.ids:
             continue
-        signal = np.zeros(len(drawn))
-        signal[form.span] = fit.coefficients
-        size = product(signal, signal) * product(drawn, drawn)
-        found[form.id] = max(product(drawn, signal) / np.sqrt(size) if size > 0 else 0.0, found.get(form.id, 0.0))
-    best = max(found, key=lambda name: found[name], default=None)
-    return best if best is not None and found[best] >= _ALIKE else None
+        both = np.concatenate([own, np.arange(form.span.start, form.span.stop)])
+        inner = without_span(gram, both, _use(rival.fit))[0]
+        pair = block_diag(drawn[:, np.newaxis], fit.coefficients[:, np.newaxis])
+        (one, across), (_, other) = pair.T @ inner @ pair
+        alike.append((float(across / np.sqrt(one * other)) if min(one, other) > 0 else 0.0, form.id))
+    nearest, name = max(alike, default=(0.0, ""))
+    return name if nearest >= _ALIKE else None
 
 
 def block_size(rival: SetWithBlock, gram: FloatArray) -> tuple[float, float, float]:
@@ -234,11 +230,16 @@ def _use(fit: FittedForms) -> IntArray:
 
 def without_own_span(fit: FittedForms, free: Block, gram: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return gram and target of a block, without what a set's own columns could take up."""
-    use, own = _use(fit), np.arange(free.span.start, free.span.stop)
+    return without_span(gram, np.arange(free.span.start, free.span.stop), _use(fit))
+
+
+def without_span(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Return gram and target of some columns without what others could take up."""
     inner, b = gram[np.ix_(own, own)], gram[own, -1]
-    if not len(use):
+    if not len(rest):
         return inner, b
-    cross = gram[np.ix_(use, own)]
-    own_gram = gram[np.ix_(use, use)] + WEAK_PRIOR * np.eye(len(use))
-    solved = np.linalg.solve(own_gram, np.column_stack([cross, gram[use, -1]]))
+    cross = gram[np.ix_(rest, own)]
+    solved = np.linalg.solve(
+        gram[np.ix_(rest, rest)] + WEAK_PRIOR * np.eye(len(rest)), np.column_stack([cross, gram[rest, -1]])
+    )
     return inner - cross.T @ solved[:, :-1], b - cross.T @ solved[:, -1]

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, without_span
 from kurumaisu.critic.ranges.search.effect_sets import WEAK_PRIOR, FittedForms, FormPosterior
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
@@ -102,7 +102,7 @@ class _JointGram:
                 drawn.append((self._own[block.free.id], block.evidence.prior))
             gram = _families_integrated(self._gram, drawn)
             rest = self._columns([form.id for form in self._fit.forms if form.id != name])
-            own, b = _without_span(gram, self._own[name], rest)
+            own, b = without_span(gram, self._own[name], rest)
             if block is not None and name == block.free.id:
                 nats = curve_evidence(own, b, block.free.priors).nats
             else:
@@ -133,15 +133,3 @@ def _families_integrated(gram: FloatArray, drawn: Sequence[tuple[IntArray, Float
     if not drawn:
         return gram
     return integrated_out(gram, np.concatenate([at for at, _ in drawn]), block_diag(*(prior for _, prior in drawn)))
-
-
-def _without_span(gram: FloatArray, own: IntArray, rest: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return gram and target of some columns without what others could take up."""
-    inner, b = gram[np.ix_(own, own)], gram[own, -1]
-    if not len(rest):
-        return inner, b
-    cross = gram[np.ix_(rest, own)]
-    solved = np.linalg.solve(
-        gram[np.ix_(rest, rest)] + WEAK_PRIOR * np.eye(len(rest)), np.column_stack([cross, gram[rest, -1]])
-    )
-    return inner - cross.T @ solved[:, :-1], b - cross.T @ solved[:, -1]
