@@ -94,7 +94,8 @@ class Story {
   Story(unsigned kind, const std::string& fault, std::string received)
       : device_(modelOf(kind), fault.empty() ? std::vector<v::Fault>{} : std::vector{v::fault(fault)},
                 {0, 1e-3}, 0),
-        received_(std::move(received)) {}
+        received_(std::move(received)),
+        clock_stands_(fault == "t-stands") {}
 
   void tell() {
     std::string said;
@@ -134,7 +135,8 @@ class Story {
   void measure(double duration) {
     v::Measurement measurement;
     measurement.start = now_;
-    Truth truth{device_.clock(now_), std::vector<int>(kEnd + 1, kOutside), std::vector<int>(kEnd + 1, 0)};
+    Truth truth{clock_stands_ ? 0 : device_.clock(now_), std::vector<int>(kEnd + 1, kOutside),
+                std::vector<int>(kEnd + 1, 0)};
     for (int step = kFirst; step <= kLast; ++step) {
       const int distance = static_cast<int>(dice_.roll(6000));
       const int intensity = static_cast<int>(dice_.roll(1U << 18U));
@@ -199,6 +201,7 @@ class Story {
 
   v::Device device_;
   std::string received_;
+  bool clock_stands_;  // where it is when the power comes
   s::Assembler assembler_;
   fuzzing::Oracle oracle_{""};
   std::deque<Truth> truths_;
