@@ -126,7 +126,7 @@ def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(t
     assembly = _assembly(tmp_path)
     statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
     missed = np.empty((*assembly.residual.shape, 0))
-    simulate, names = ScatterSimulator(assembly, statistics, missed), statistics.names()
+    simulate, names = ScatterSimulator(assembly.shots, assembly.marks, statistics, missed), statistics.names()
     far = next(i for i, name in enumerate(names) if name.startswith("readings more than 25"))
     plain, tails, bursts = (
         simulate(settings, 3)[far]

@@ -42,7 +42,7 @@ from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
 from kurumaisu.effects.laser import LASER, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
-from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, smooth_range_of
+from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, smooth_reading_of, smooth_scatter_id
 from kurumaisu.effects.lateral_slip import LateralSlip
 from kurumaisu.effects.left_right_gain import LeftRightGain
 from kurumaisu.effects.map_error import MapError
@@ -142,9 +142,9 @@ def by_id(name: str) -> type[Mechanism]:
     smooth = smooth_of(name)
     if smooth is not None:
         return smooth
-    ranged = smooth_range_of(name)
-    if ranged is not None:
-        return ranged
+    reading = smooth_reading_of(name)
+    if reading is not None:
+        return reading
     raise Error(f"effects: {name!r} is not in the catalogue; {hint(name, _BY_ID, 'docs/effects.md')}")
 
 
@@ -277,4 +277,5 @@ __all__ = [
     "slanted",
     "smooth_id",
     "smooth_range_id",
+    "smooth_scatter_id",
 ]

@@ -13,8 +13,8 @@ from kurumaisu.critic.judge.clock_drift import without_double_delay
 from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter, with_shifting_forms
 from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
-from kurumaisu.critic.judge.scatter_verdict import MeanFit, material, open_set, scatter_effects
-from kurumaisu.critic.judge.unknown_readings import unknowns
+from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
+from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.beams import gather, why_not_usable
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
@@ -26,7 +26,6 @@ from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
 from kurumaisu.critic.scatter.common_offset import own_sd
-from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.progress import Progress
@@ -136,17 +135,17 @@ def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
     question.progress("laser: comparing effects on the scatter")
     assembly, normal, made = mean.assembly, mean.normal, mean.made
     own = own_sd(question.model.effects)
-    scatter, comparison = scatter_effects(mean, question.recording, question.ids, own)
-    heard = material(scatter, normal, own)
+    scatter = scatter_effects(mean, question.recording, question.ids, own)
+    heard = replace(scatter, effects=material(scatter.effects, normal, own))
     finding = without_double_delay(_finding(assembly, normal, made, mean.fit, heard), assembly.shots.stamps)
-    slight = tuple(each.setting.id for each in scatter if each not in heard)
+    slight = tuple(each.setting.id for each in scatter.effects if each not in heard.effects)
     words = tuple(
         f"{name}: detectable, but too small to matter, compared with the scatter of single readings." for name in slight
     )
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
     finding = replace(finding, next_experiment=_next(finding, assembly, question.recording, question.model))
     shown = misfits(assembly, normal, made.parts())
-    return replace(finding, pictures=Pictures(shown, alternatives(made.found), noise_rows(normal), comparison))
+    return replace(finding, pictures=Pictures(shown, alternatives(made.found), noise_rows(normal), scatter.comparisons))
 
 
 def _with_rest(
@@ -176,7 +175,7 @@ def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model
 
 
 def _finding(
-    assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, scatter: list[ScatterEffect]
+    assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, scatter: Scatter
 ) -> LaserFinding:
     p = made.p
     sizes = {form.id: _rms(assembly, normal, made.fit, form.id) for form in made.fit.forms}
@@ -199,14 +198,16 @@ def _finding(
     # Of the scans as they are seen with what acts: a laser that is askew looks past the ends of walls.
     unknown = tuple(fit.assembly.unknowns())
     unknown += tuple(unknowns(made.weighed, normal.gram)) if curve else ()
+    unknown += tuple(unknown_scatter(scatter.curves))
     groups = () if curve else _confused(assembly, normal, made, causes)
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
     small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
-    causes, added = with_scatter(causes, settings, scatter)
+    causes, added = with_scatter(causes, settings, scatter.effects)
     causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added})
-    confounded += tuple(group for group in map(open_set, scatter) if group)
+    confounded += tuple(group for group in map(open_set, scatter.effects) if group)
+    added += tuple(each.setting for each in scatter.curves[:1])
     return LaserFinding(causes, confounded, unknown, added, details, small=small)
 
 

@@ -3,17 +3,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.ranges.scans.beams import Shots, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit
 from kurumaisu.critic.scatter.common_offset import beyond_own_offset, with_common_offset
+from kurumaisu.critic.scatter.curves import ScatterCurve, ScatterCurves
 from kurumaisu.critic.scatter.scatter_fit import ScatterFit
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
@@ -38,23 +41,31 @@ class MeanFit:
     fit: ParameterFit
 
 
-def scatter_effects(
-    mean: MeanFit, recording: Recording, ids: frozenset[str] | None, own: float
-) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
-    """Return the effects on how readings scatter, those of whole scans among them, and what they mend.
+@dataclass(frozen=True)
+class Scatter:
+    """What acts on how readings scatter: effects; curves in no catalogue, the likeliest first; what they mend."""
+
+    effects: list[ScatterEffect]
+    curves: list[ScatterCurve]
+    comparisons: tuple[Comparison, ...]
+
+
+def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | None, own: float) -> Scatter:
+    """Return what acts on how readings scatter, effects on whole scans among it.
 
     own: the sd [m] of whole scans in the model.
     """
     assembly, made, fit = mean.assembly, mean.made, mean.fit
     if fit.assembly.unmapped:
-        return [], ()
+        return Scatter([], [], ())
     away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, mean.normal.gram)
-    scatter, comparison = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
-    if not made.curve:
-        seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
-        scatter = with_common_offset(scatter, seen, fit.normal.scan_noise, recording, ids)
-        scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)
-    return scatter, comparison
+    found = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
+    if made.curve:
+        return found
+    seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
+    scatter = with_common_offset(found.effects, seen, fit.normal.scan_noise, recording, ids)
+    scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)
+    return replace(found, effects=scatter)
 
 
 def material(scatter: list[ScatterEffect], normal: NormalEquations, own: float) -> list[ScatterEffect]:
@@ -64,8 +75,8 @@ def material(scatter: list[ScatterEffect], normal: NormalEquations, own: float) 
 
 def _of_readings(
     assembly: Assembly, fit: ParameterFit, ids: frozenset[str] | None, *, strange: bool, away: float
-) -> tuple[list[ScatterEffect], tuple[Comparison, ...]]:
-    """Return the effects on how readings scatter about the best fit of their mean, and what they mend.
+) -> Scatter:
+    """Return what acts on how readings scatter about the best fit of their mean.
 
     strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
     how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
@@ -77,12 +88,36 @@ def _of_readings(
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}
     measured = few.shots.measured
-    seen = statistics.of(measured, np.where(np.isfinite(measured), fit.left[rows], np.nan))
+    error = np.where(np.isfinite(measured), fit.left[rows], np.nan)
+    seen = statistics.of(measured, error)
     heard = ~statistics.of_errors() | (not strange)
-    simulate = ScatterSimulator(few, statistics, fit.missed[rows])
-    search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard))
-    found = search.run()
-    return found, (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
+
+    def searched(shots: Shots, curve: float = 0.0) -> tuple[ScatterSimulator, ScatterSearch, list[ScatterEffect]]:
+        simulate = ScatterSimulator(shots, few.marks, statistics, fit.missed[rows])
+        search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard), curve)
+        return simulate, search, search.run()
+
+    simulate, search, found = searched(few.shots)
+    if strange or (ids is not None and effects.SMOOTH not in ids):
+        return Scatter(found, [], _compared(search, statistics, found))
+    known = ScatterCurves(few, statistics, simulate, [each.setting for each in found])
+    curves = known.run(measured, error)
+    if curves:  # what was taken for it in the catalogue need not act
+        _, search, found = searched(with_own(few.shots, curves[0].setting), curves[0].nats)
+    for one in found if curves else ():
+        if effects.by_id(one.setting.id).stage != effects.by_id(curves[0].setting.id).stage:
+            continue
+        rest = [each.setting for each in found if each is not one]
+        level = known.alone(curves[0], measured, error, rest)
+        _, other, fewer = searched(with_own(few.shots, level.setting), level.nats)
+        if len(fewer) < len(found):
+            curves, search, found = [level, *curves[1:]], other, fewer
+            break
+    return Scatter(found, curves, _compared(search, statistics, found))
+
+
+def _compared(search: ScatterSearch, statistics: Statistics, found: Sequence[ScatterEffect]) -> tuple[Comparison, ...]:
+    return (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
 def open_set(scatter: ScatterEffect) -> tuple[str, ...]:

@@ -3,26 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison
+from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.shapes import grid, shape_of
-from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL, UNKNOWN_SCATTER
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3
-_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s"}  # all others of RANGE_COVARIATES are angles
+_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s", "v": "m/s", "w": "rad/s"}  # all others of RANGE_COVARIATES are angles
 
 
 @dataclass(frozen=True)
-class RangeCurve:
+class ReadingCurve:
     """A curve with its coefficients (m,) and their covariance (m, m), as shapes describes it."""
 
     basis: Basis
@@ -40,19 +41,30 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
             continue
         seen.add(rival.free.id)
         p = min(weighed.p[rival.free.id], 1.0)
-        column = basis.covariate not in effects.RANGE_COVARIATES  # called as the recording calls it
-        name = basis.covariate if column else basis.covariate.replace("_", " ")
-        yield Unknown(UNKNOWN_CHANNEL, name, shape(rival, basis, gram), p)
+        _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
+        curve = ReadingCurve(basis, 1e3 * coefficients, 1e6 * covariance)
+        yield Unknown(UNKNOWN_CHANNEL, _called(basis), shape(curve, "mm"), p)
 
 
-def shape(rival: SetWithBlock, basis: Basis, gram: FloatArray) -> str:
-    """Return a curve's shape with place and size, each with its 90 % interval."""
-    _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
-    described = RangeCurve(basis, coefficients, covariance)
-    found, at = shape_of(described), grid(described)
+def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:
+    """Yield curves that the noise of readings follows."""
+    for one in curves:
+        curve = ReadingCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
+        yield Unknown(UNKNOWN_SCATTER, _called(one.basis), f"of the noise: {shape(curve, '%')}", one.p)
+
+
+def _called(basis: Basis) -> str:
+    """Return what a reader calls a covariate: a column as the recording calls it."""
+    return basis.covariate.replace("_", " ") if basis.covariate in effects.RANGE_COVARIATES else basis.covariate
+
+
+def shape(curve: ReadingCurve, of: str) -> str:
+    """Return a curve's shape with place and size, each with its 90 % interval; of: its unit."""
+    found, at = shape_of(curve), grid(curve)
+    basis = curve.basis
     unit = _UNITS.get(basis.covariate, "rad" if basis.covariate in effects.RANGE_COVARIATES else "")
-    size, low, high = 1e3 * (np.abs(found.size) if found.kind == "line" else found.size)
-    told = f"{size:.3g} mm (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
+    size, low, high = np.abs(found.size) if found.kind == "line" else found.size
+    told = f"{size:.3g} {of} (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
     span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
     if found.kind == "line":
         return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} {span}"

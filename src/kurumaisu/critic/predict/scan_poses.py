@@ -13,7 +13,7 @@ from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
-from kurumaisu.critic.ranges.scans.beams import Shots, Track, gather, thin
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, columns_at, gather, rates_at, thin
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -41,18 +41,15 @@ class ScanPoses:
         """Return shots of a run with poses at stamps (k,) [s]; measured (k, b) [m], if known."""
         tracks = self._tracks(run, stamps)
         shape = (len(stamps), self._base.laser.beams)
+        owner = np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int)
         return replace(
             self._base,
             tracks=tuple(Track(track.times - self.zero, track.poses) for track in tracks),
             stamps=stamps - self.zero,
-            run=np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int),
+            run=owner,
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
-            known={
-                name: np.interp(stamps, run.covariates[name].t, run.covariates[name].values[:, 0])
-                for name in self._base.known
-                if name in run.covariates
-            },
+            known={**columns_at(run, self._base.known, stamps), **rates_at(tracks, owner, stamps)},
         )
 
     def trained(self) -> list[Shots]:

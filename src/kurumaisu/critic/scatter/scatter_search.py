@@ -25,6 +25,7 @@ _QUIET = 3.5  # sds that some statistic must be off by before any effect is trie
 _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LEFT = 0.02  # share of an effect's evidence that its own form may leave to one that changes the same numbers
 _MOST_LEFT = 15.0  # nats at most: ten numbers off by twice what the likelihood allows for another form
+_CURVE_LEFT = 0.1  # share of a curve's evidence likewise: nobody knows whether noise is added or multiplied there
 _WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
 _REFITS = 4  # effects that are refitted
@@ -77,8 +78,9 @@ def _by_effect(pieces: Sequence[ScatterPiece]) -> list[list[ScatterPiece]]:
 class ScatterSearch:
     """Finds the effects that the statistics call for."""
 
-    def __init__(self, fit: ScatterFit) -> None:
-        self._fit = fit
+    def __init__(self, fit: ScatterFit, curve: float = 0.0) -> None:
+        """Take the fit; curve: evidence [nat] of a curve in the model, which misses steps, and what noise is like."""
+        self._fit, self._enough = fit, max(_MOST_LEFT, _CURVE_LEFT * curve) if curve > 0 else _ENOUGH
         self._likeness = self._fit.likeness
 
     def run(self) -> list[ScatterEffect]:
@@ -223,7 +225,7 @@ class ScatterSearch:
     def _least(self, chosen: Sequence[ScatterPiece], new: ScatterPiece) -> float:
         """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
         left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
-        return max(_ENOUGH, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else _ENOUGH
+        return max(self._enough, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else self._enough
 
     def _settled(
         self,

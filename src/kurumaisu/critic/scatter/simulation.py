@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import model_effects_with, read
-from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.scans.beams import Shots, model_effects_with, read
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.effects import Mechanism
@@ -20,9 +20,9 @@ from kurumaisu.types import FloatArray
 class ScatterSimulator:
     """Statistics of the shots with effects on how readings scatter."""
 
-    def __init__(self, assembly: Assembly, statistics: Statistics, missed: FloatArray) -> None:
-        """Take the geometry; missed (k, b, n) [m]: what equations of the mean may have wrong in the readings, 1 sd."""
-        self._assembly = assembly
+    def __init__(self, shots: Shots, marks: EffectColumns, statistics: Statistics, missed: FloatArray) -> None:
+        """Take shots and their marks; missed (k, b, n) [m]: what equations of the mean may have wrong, 1 sd."""
+        self._shots, self._marks = shots, marks
         self._statistics = statistics
         self._missed = missed
 
@@ -32,7 +32,7 @@ class ScatterSimulator:
 
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
         """Return an effect's parameters in the model as it is."""
-        return self._assembly.marks.null(effect)
+        return self._marks.null(effect)
 
     def nulls(self, seeds: Sequence[int]) -> FloatArray:
         """Return the statistics of simulations without effects, about means that are not quite right, (n, m)."""
@@ -47,11 +47,16 @@ class ScatterSimulator:
 
     def _simulated(self, settings: Sequence[EffectSetting], seed: int, off: FloatArray) -> FloatArray:
         """Return the statistics of readings that are off (k, b) [m] from where they are expected."""
-        shots, seen, base = self._assembly.shots, self._assembly.marks.seen, self._assembly.marks.base
+        readings, error = self.scans(settings, seed)
+        return self._statistics.of(readings, error + off)
+
+    def scans(self, settings: Sequence[EffectSetting], seed: int) -> tuple[FloatArray, FloatArray]:
+        """Return the readings (k, b) [m] of a simulation, and how far they are off their mean; NaN where none is."""
+        shots, seen, base = self._shots, self._marks.seen, self._marks.base
         rng = np.random.default_rng([seed, 7])
         chain = effects.build_laser(model_effects_with(shots, settings), np.random.default_rng(seed))
         error = shots.laser.error
         raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
         readings = error.reading(error.range(raw), np.zeros_like(raw))
         with np.errstate(invalid="ignore"):
-            return self._statistics.of(readings, np.where(np.isfinite(readings), readings - base + off, np.nan))
+            return readings, np.where(np.isfinite(readings), readings - base, np.nan)

@@ -97,9 +97,7 @@ class Statistics:
         said = readings[self._trust]
         ends = cut_off_ends(said)
         left, common = self._leftover(error, ends)
-        inside = self._trust & np.isfinite(left)
-        z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
-        free, known = fluctuating(z, inside, self._stand)
+        inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
         out += _correlations(free, known)
         size = np.abs(left[inside])
@@ -113,6 +111,21 @@ class Statistics:
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_once(self._edges.mixed(readings), self._stand)))
         return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
+
+    def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
+
+        readings, error: as of `of`.
+        """
+        left, _ = self._leftover(error, cut_off_ends(readings[self._trust]))
+        _, _, free, known = self._fluctuating(left)
+        return free**2, known
+
+    def _fluctuating(self, left: FloatArray) -> tuple[BoolArray, FloatArray, FloatArray, BoolArray]:
+        """Return which readings count, what is left of them, cut, and what of it fluctuates, and where; (k, b) each."""
+        inside = self._trust & np.isfinite(left)
+        z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
+        return inside, z, *fluctuating(z, inside, self._stand)
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""

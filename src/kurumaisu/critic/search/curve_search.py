@@ -141,11 +141,12 @@ class CurveSearch:
         beside = one.fit.beside
         free, prior = without(beside.own, self._columns(one.curve)), one.evidence.prior
         drawn = free @ np.linalg.solve(np.eye(len(prior)) + prior @ (free.T @ free), prior @ (free.T @ beside.residual))
-        found = {}
-        for fit in more:
+        found: dict[str, float] = {}
+        for fit in more:  # an effect may be there in several forms
             (name,) = fit.ids - one.fit.ids
             signal = without(beside.own, self._signals(fit, name).sum(axis=1))
-            found[name] = float(drawn @ signal) / max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
+            alike = float(drawn @ signal) / max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
+            found[name] = max(found.get(name, -1.0), alike)
         best = max(found, key=lambda name: found[name], default=None)
         return replace(one, form_of=best) if best is not None and found[best] >= _ALIKE else one
 

@@ -87,7 +87,8 @@ class _Search:
             self.curves = CurveSearch(self.problem, best)
             self._go_on()
         near = [fit for fit in self.fits.values() if self.score(fit) > self.score(best) - _NEAR]
-        for fit in sorted(near, key=self.score, reverse=True)[:_CLOSER]:
+        near = sorted(near, key=self.score, reverse=True)[:_CLOSER]
+        for fit in near:
             self.curves.closer(fit)
         best = max(self.fits.values(), key=self.score)
         if any(one.nats > 0 for one in self.curves.found(best)[:1]):

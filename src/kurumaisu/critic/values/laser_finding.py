@@ -9,7 +9,8 @@ from kurumaisu.critic.values.story import Alternative, Comparison, Misfit, Noise
 from kurumaisu.critic.values.verdict import Cause, NextExperiment, Unknown
 from kurumaisu.params import EffectSetting
 
-UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue
+UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue, of the mean of readings
+UNKNOWN_SCATTER = "laser.scatter"  # and of how they scatter
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""smooth.range.COVARIATE: readings depart from the model by a curve over something that they follow.
+"""smooth.range.COVARIATE and smooth.scatter.COVARIATE: readings, or their noise, follow a curve over something.
 
 What the critic puts into the model for an effect of the laser that is not in the catalogue.
 """
@@ -20,7 +20,7 @@ from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
 from kurumaisu.types import FloatArray
 
-_ID = re.compile(r"smooth\.range\.(\w+)")
+_ID = re.compile(r"smooth\.(range|scatter)\.(\w+)")
 _MOST = 64  # knots
 Reads = Callable[[Echoes], FloatArray]
 
@@ -50,16 +50,14 @@ RANGE_COVARIATES: Mapping[str, Reads] = {
 _PLACED = ("heading", "world_bearing", "hit_x", "hit_y")
 
 
-class SmoothRange(ReadingEffect):
-    """A curve over a covariate, added to the mean; straight between knots, constant beyond the outer ones.
+class SmoothReading(ReadingEffect):
+    """A curve over a covariate; straight between knots, constant beyond the outer ones.
 
-    A name that is not among RANGE_COVARIATES is a quantity measured beside the scans, as in Echoes.known. Where nobody
-    knows it, or the laser's pose, curves over it add nothing. Made by smooth_range_of.
+    A name that is not among RANGE_COVARIATES is a quantity known beside the scans, as in Echoes.known. Where nobody
+    knows it, or the laser's pose, curves over it do nothing. Made by smooth_reading_of.
     """
 
-    stage = LaserStage.BIAS
     parameters = ()
-    formula = "µ + curve(covariate)"
     source = "the critic, from a recording"
     covariate: ClassVar[str]
 
@@ -76,29 +74,62 @@ class SmoothRange(ReadingEffect):
         if (np.diff(numbered(values, "knot", 0)) <= 0).any():
             raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
 
-    def apply(self, echoes: Echoes) -> Echoes:
-        """Shift the mean by the curve."""
+    def curve(self, echoes: Echoes) -> FloatArray | float:
+        """Return the curve at the beams (n,)."""
         if self.covariate in _PLACED and echoes.origins is None:
-            return echoes
+            return 0.0
         reads = RANGE_COVARIATES.get(self.covariate)
         at = echoes.known.get(self.covariate) if reads is None else reads(echoes)
         if at is None:
-            return echoes
-        added = np.interp(at, numbered(self.values, "knot", 0), numbered(self.values, "value", 0))
-        return replace(echoes, mean=echoes.mean + added)
+            return 0.0
+        return np.asarray(np.interp(at, numbered(self.values, "knot", 0), numbered(self.values, "value", 0)))
+
+
+class SmoothRange(SmoothReading):
+    """Such a curve [m], added to the mean."""
+
+    stage = LaserStage.BIAS
+    formula = "µ + curve(covariate)"
+
+    def apply(self, echoes: Echoes) -> Echoes:
+        """Shift the mean by the curve."""
+        return replace(echoes, mean=echoes.mean + self.curve(echoes))
+
+
+class SmoothScatter(SmoothReading):
+    """Such a curve [1], the log of a factor of the noise."""
+
+    stage = LaserStage.SPREAD
+    formula = "σ · exp(curve(covariate))"
+
+    def apply(self, echoes: Echoes) -> Echoes:
+        """Scale the noise by the curve."""
+        return replace(echoes, sd=echoes.sd * np.exp(self.curve(echoes)))
+
+
+_CHANNELS: Mapping[str, tuple[type[SmoothReading], str]] = {
+    "range": (SmoothRange, "the ranges"),
+    "scatter": (SmoothScatter, "how ranges scatter"),
+}
 
 
 @cache
-def smooth_range_of(name: str) -> type[SmoothRange] | None:
-    """Return the effect of an id smooth.range.COVARIATE, None for another one."""
+def smooth_reading_of(name: str) -> type[SmoothReading] | None:
+    """Return the effect of an id smooth.range.COVARIATE or smooth.scatter.COVARIATE, None for another one."""
     match = _ID.fullmatch(name)
     if match is None:
         return None
-    text = f"an unknown effect changes the ranges with {match[1].replace('_', ' ')}"
-    own = {"id": name, "covariate": match[1], "sentence": text, "oblique": match[1] == "incidence"}
-    return type("SmoothRange", (SmoothRange,), own)
+    family, what = _CHANNELS[match[1]]
+    text = f"an unknown effect changes {what} with {match[2].replace('_', ' ')}"
+    own = {"id": name, "covariate": match[2], "sentence": text, "oblique": match[2] == "incidence"}
+    return type(family.__name__, (family,), own)
 
 
 def smooth_range_id(covariate: str) -> str:
     """Return the id of the effect on readings that follows a covariate."""
     return f"smooth.range.{covariate}"
+
+
+def smooth_scatter_id(covariate: str) -> str:
+    """Return the id of the effect on the noise of readings that follows a covariate."""
+    return f"smooth.scatter.{covariate}"

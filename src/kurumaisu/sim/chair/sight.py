@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu.geometry import interpolate
+from kurumaisu.geometry import between, interpolate
 from kurumaisu.sim.chair.world import ChairWorld
 from kurumaisu.types import FloatArray, IntArray
 
@@ -50,6 +50,14 @@ class Sight:
     def poses(self, times: FloatArray) -> FloatArray:
         """Return where the chair was (n, 3), at times (n,)."""
         return interpolate(np.array(self._times), np.array(self._chair), times)
+
+    def rates(self) -> dict[str, float]:
+        """Return how the chair has moved in the time that is remembered, v [m/s] and w [rad/s]; none of a moment."""
+        span = self._times[-1] - self._times[0]
+        if span <= 0:
+            return {}
+        ahead, _, turned = (between(self._chair[0], self._chair[-1]) / span).tolist()
+        return {"v": ahead, "w": turned}
 
     def look(self, times: FloatArray, height: float) -> Look:
         """Return what is to be seen at times (n,) from so far above the chair's base [m]."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu._core import Arena
 from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
-from kurumaisu.geometry import PLANAR, compose, interpolate
+from kurumaisu.geometry import PLANAR, between, compose, interpolate, wrap
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.rangers.fans import RangerFan, moments
 from kurumaisu.sim.sensors.ranger_noise import deviation
@@ -91,6 +91,7 @@ class FanEffects:
             noise=np.where(np.isfinite(noise) & (look.ranges < fan.range_max), noise, own),
             readings=look.ranges,
             origins=look.origins,
+            known=self._rates(),
         )
         readings = self._chain.read(echoes)
         beyond = readings > fan.range_max
@@ -122,6 +123,12 @@ class FanEffects:
         ahead = np.maximum(times - self._times[-1], 0.0) / self._step
         way = known[-1] - known[-2]
         return np.asarray(interpolate(np.array(self._times), known, times) + ahead[:, np.newaxis] * way)
+
+    def _rates(self) -> dict[str, float]:
+        """Return how the body moved in the last step, v [m/s] and w [rad/s]."""
+        before, now = (pose[PLANAR] for pose in self._poses[-2:])
+        ahead, _, turned = between(before, now).tolist()
+        return {"v": ahead / self._step, "w": float(wrap(turned)) / self._step}
 
     def _forget(self, before: float) -> None:
         """Drop what the next scan does not need; its beams are fired after those of this one."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,8 @@ from kurumaisu.world import load_world
 MOST_SCANS = 250  # that are criticised, evenly taken from all: 170 000 readings
 _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
+RATES = ("v", "w")  # [m/s, rad/s] of the chair, by the reference
+_ABOUT = 0.15  # [s] before and after a scan, between which its rates are taken
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Shots:
     stamps (k,) [s] since the laser's time 0, which is `zero` [s] by the clock of the runs; run (k,): index into tracks
     and runs, their names; measured (k, b) [m], nan no valid reading,
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
-    known: what else was recorded, by name, at each scan (k,).
+    known: what else was recorded, by name, at each scan (k,), and the chair's rates.
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
     linearised there; a rate taken from noisy poses would be a noisy covariate.
     """
@@ -103,7 +105,7 @@ def gather(recording: Recording, model: Model) -> Shots:
     zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
-    known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names)}
+    known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names - set(RATES))}
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
@@ -111,24 +113,40 @@ def gather(recording: Recording, model: Model) -> Shots:
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])
-        for name, parts in known.items():
-            series = run.covariates[name]
-            parts.append(np.interp(run.scan.t[rows], series.t, series.values[:, 0]))
-    readings = np.concatenate(measured)
+        for name, values in columns_at(run, known, run.scan.t[rows]).items():
+            known[name].append(values)
+    readings, owner = np.concatenate(measured), np.array([i for i, _ in chosen])
+    rates = rates_at(tracks, owner, np.concatenate(stamps))
     return Shots(
         laser=laser,
         own=model.effects,
         walls=walls_at(load_world(recording.world), laser.mount.z),
         tracks=tuple(tracks),
         stamps=np.concatenate(stamps),
-        run=np.array([i for i, _ in chosen]),
+        run=owner,
         measured=readings,
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
-        known={name: np.concatenate(parts) for name, parts in known.items()},
+        known={**{name: np.concatenate(parts) for name, parts in known.items()}, **rates},
         zero=zero,
         runs=tuple(run.name for run in runs),
     )
+
+
+def columns_at(run: Run, names: Iterable[str], stamps: FloatArray) -> dict[str, FloatArray]:
+    """Return the columns of these names that a run has, at stamps (k,) [s]."""
+    there = {name: run.covariates[name] for name in names if name in run.covariates}
+    return {name: np.interp(stamps, series.t, series.values[:, 0]) for name, series in there.items()}
+
+
+def rates_at(tracks: Sequence[Track], run: IntArray, stamps: FloatArray) -> dict[str, FloatArray]:
+    """Return the chair's rates at stamps (k,) [s], whose tracks are those of indices run (k,)."""
+    moved = np.empty((len(stamps), 3))
+    for i, track in enumerate(tracks):
+        rows = run == i
+        ends = [geometry.interpolate(track.times, track.poses, stamps[rows] + after) for after in (-_ABOUT, _ABOUT)]
+        moved[rows] = geometry.between(*ends) / (2 * _ABOUT)
+    return dict(zip(RATES, np.where(np.abs(moved) < effects.RESTS, 0.0, moved)[:, [0, 2]].T, strict=True))
 
 
 def time_zero(runs: Sequence[Run]) -> float:
@@ -175,6 +193,11 @@ def model_effects_with(shots: Shots, settings: Sequence[EffectSetting]) -> tuple
     """Return the model's own effects with these in place of those of the same id."""
     given = {setting.id for setting in settings}
     return (*(own for own in shots.own if own.id not in given), *settings)
+
+
+def with_own(shots: Shots, setting: EffectSetting) -> Shots:
+    """Return the shots of a model that has an effect besides."""
+    return replace(shots, own=(*shots.own, setting))
 
 
 def hits_of(

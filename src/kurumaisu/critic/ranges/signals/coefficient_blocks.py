@@ -125,14 +125,12 @@ def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
 
 
 def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatArray]]:
-    echoes = echoes_of(shots, marks.seen)
     known = np.isfinite(marks.base)
     stand = stands_of(shots)
     jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
-    beside = {name: np.repeat(values[:, np.newaxis], known.shape[1], axis=1) for name, values in shots.known.items()}
-    for name, at in {**{name: of(echoes) for name, of in effects.RANGE_COVARIATES.items()}, **beside}.items():
+    for name, at in covariates(shots, marks.seen).items():
         values = at[known]
-        if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in beside else _LEAST):
+        if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in shots.known else _LEAST):
             continue
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
         knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
@@ -146,6 +144,13 @@ def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatAr
         basis = Basis(name, knots, {}, priors, float(low), float(high))
         columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
         yield Block(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
+
+
+def covariates(shots: Shots, seen: BeamHits) -> dict[str, FloatArray]:
+    """Return what curves may follow, by name, at each beam (k, b)."""
+    echoes = echoes_of(shots, seen)
+    beside = {name: np.repeat(at[:, np.newaxis], shots.laser.beams, axis=1) for name, at in shots.known.items()}
+    return {**{name: of(echoes) for name, of in effects.RANGE_COVARIATES.items()}, **beside}
 
 
 def echoes_of(shots: Shots, seen: BeamHits) -> Echoes:
