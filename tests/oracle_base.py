@@ -141,9 +141,14 @@ RATES["base.dead_zone_w"] = _each(lambda p, v, w: (v, 0.0, _swallowed("steering"
 
 @_rates("base.backlash")
 def backlash(p, drive):
-    """A peg in a slot as wide as the play."""
+    """A peg in a slot as wide as the play; or a string of that length that pulls a turn up, and does not push it."""
     half, peg, out = p["play"] / 2, 0.0, []
     for v, w in zip(drive.v, drive.w, strict=True):
+        if p["onset"] >= 0.5:
+            held = peg if peg * w > 0 else 0.0
+            peg = math.copysign(min(abs(w), max(abs(held), abs(w) - p["play"])), w)
+            out.append(peg)
+            continue
         if w - half > peg:
             peg = w - half
         elif w + half < peg:

@@ -157,6 +157,15 @@ def test_backlash_drags_and_lets_go_at_rest():
     np.testing.assert_allclose(apply("base.backlash", {"play": 0.2}, v, w).w, expected, atol=1e-12)
 
 
+def test_backlash_taken_up_at_the_onset_is_lost_while_a_turn_grows():
+    """Each side by itself: what begins to turn to the other one takes up its own play."""
+    w = np.array([0.1, 0.5, 0.4, 0.2, 0.0, 0.3, -0.3, -0.25, -0.1])
+    expected = [0.0, 0.3, 0.3, 0.2, 0.0, 0.1, -0.1, -0.1, -0.1]
+    moved = apply("base.backlash", {"play": 0.2, "onset": 1.0}, np.ones(len(w)), w).w
+    np.testing.assert_allclose(moved, expected, atol=1e-12)
+
+
+
 @given(inputs=st.lists(st.floats(-1, 1), min_size=1, max_size=60), play=st.floats(0, 0.5))
 @settings(max_examples=50)
 def test_backlash_is_never_further_than_half_the_play(inputs, play):

@@ -3,30 +3,46 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from kurumaisu import _core
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 
 class Backlash(Effect):
-    """Yaw rate dragged along by its command with play; a chair commanded to rest rests."""
+    """Yaw rate dragged along by its command with play; a chair commanded to rest rests.
+
+    onset: with 0 a rate that grows and one that falls miss the command by half of the play each; with 1 the play is
+    taken up by what begins to turn, so that a rate that grows misses all of it and one that falls nothing.
+    """
 
     id = "base.backlash"
     stage = Stage.THRESHOLD
-    parameters = (Parameter("play", "rad/s", null=0.0, scale=0.03, lower=0.0, upper=1.0),)
+    parameters = (
+        Parameter("play", "rad/s", null=0.0, scale=0.03, lower=0.0, upper=1.0),
+        Parameter("onset", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+    )
+    forms = ({"onset": 0.0}, {"onset": 1.0})
     empirical = True
     sentence = "the yaw rate has play: it depends on the direction in which its command changed"
-    formula = "w' = min(max(w', w − play/2), w + play/2) while moving"
+    formula = "w' = min(max(w', w − play/2), w + play/2) while moving, or with onset = 1 w − sign(w) · play/2 in place of w"
     source = "assumed: play of joystick or gear; 5-50 mrad/s"
     shows_in = Rate.W
     follows = Follows.W_CHANGE
 
-    _level = 0.0
+    _level = _left = _right = 0.0
 
     def apply(self, motion: Motion) -> Motion:
         """Drag w."""
-        w, self._level = _core.play(motion.w, self.values["play"] / 2, self._level)
+        half = self.values["play"] / 2
+        if self.values["onset"] >= 0.5:
+            left, self._left = _core.play(np.maximum(motion.w, 0.0) - half, half, self._left)
+            right, self._right = _core.play(np.maximum(-motion.w, 0.0) - half, half, self._right)
+            return replace(motion, w=left - right)
+        w, self._level = _core.play(motion.w, half, self._level)
         return replace(motion, w=motion.moving * w)
 
     def settle(self, motion: Motion) -> None:
         """Stand in the middle of the play."""
-        self._level = float(motion.w[-1])
+        at, half = float(motion.w[-1]), self.values["play"] / 2
+        self._level, self._left, self._right = at, max(at - half, 0.0), max(-at - half, 0.0)
