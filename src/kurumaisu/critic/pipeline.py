@@ -16,6 +16,7 @@ from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, with
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
@@ -28,6 +29,7 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
+from kurumaisu.params import Model
 from kurumaisu.whole_files import write_whole
 
 
@@ -42,13 +44,23 @@ def criticise(
 ) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
-    Without voltages a robot that is asked for more than the model's voltages can say has none: "velocity follows
-    command", unless the recording names a model or assume_law says that it has the model's voltage law. ids: the
-    effects that may be named; None for all that are criticised. slam: whether SLAM is run with both models on a run
-    held out, which takes some seconds.
-    Raise Error when a run has no reference, or nothing that drove the robot.
+    Which robot it is of: see model_of. ids: the effects that may be named; None for all that are criticised. slam:
+    whether SLAM is run with both models on a run held out, which takes some seconds.
+    Raise Error when a run has no reference, nothing that drove the robot, or voltages of one that has none.
     """
     model = model_of(recording, model_file, assume_law=assume_law)
+    return with_robot(_criticised(recording, model, model_file, progress, ids, slam=slam), recording)
+
+
+def _criticised(
+    recording: Recording,
+    model: Model,
+    model_file: Path,
+    progress: Progress,
+    ids: frozenset[str] | None,
+    *,
+    slam: bool,
+) -> Criticism:
     recording = masks.set_aside(recording, model)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not withheld(recording, run)))
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
