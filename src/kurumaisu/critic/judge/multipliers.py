@@ -5,12 +5,13 @@ The controller turns its wheels by (v ± w b s / 2) / (r m): b, r are the track 
 multipliers of the track and of each side's radius. A robot whose steady rates are G times those that it is asked for
 has G_vv = (m_l + m_r) / 2, G_ww = G_vv / s and G_wv = (m_r - m_l) / (b s).
 
-They are fitted whether or not they differ from 1 enough for a cause to be named; beside them, what only delays rates.
+They are fitted whether or not they differ from 1 enough for a cause to be named, beside all that was found; of that,
+what leaves rates in proportion counts as theirs, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.engine.catalogue import Candidate, settings_of
+from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate, Multipliers
@@ -27,8 +28,8 @@ from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _HELD = 20.0  # [s] after which rates that were asked for are steady
-_TRIED = np.array([[0.3, 0.0], [0.0, 0.5], [-0.3, 0.0], [0.0, -0.5]])  # [m/s], [rad/s]
-_SAME = 1e-3  # [m/s], [rad/s] by which steady rates may differ from those asked for
+_TRIED = np.array([[0.3, 0.0], [0.0, 0.5], [-0.3, 0.0], [0.0, -0.5], [0.03, 0.0], [0.0, 0.05]])  # [m/s], [rad/s]
+_SAME = 1e-3  # [m/s], [rad/s] by which steady rates may be out of proportion
 _MOST = 5.0  # a multiplier beyond is none: an axis is reversed, or in another unit
 # UMBmark (Borenstein and Feng 1996): a square of 4 m, slowly, cornering on the spot, in both directions
 _SIDE, _SPEED, _TURN, _REST = 4.0, 0.2, np.radians(40.0), 2.0
@@ -59,29 +60,34 @@ def measured(problem: Problem, best: Fit) -> Multipliers | None:
     own = [each for each in problem.candidates if each.id in wheels]
     if track is None or {each.id for each in own} != wheels:
         return None
-    fit = problem.fit_candidates([*(each for each in best.candidates if _only_delays(model, each, best)), *own], {})
-    values = _values(model, fit.values, fit)
+    others = [each for each in best.candidates if each.id not in wheels]
+    fit = problem.fit_candidates([*others, *own], best.start)
+    ids = {s.id for s in fit.settings if s.id in wheels or _in_proportion(model, [s])}
+    values = _values(model, fit.values, fit, ids)
     if values is None:
         return None
-    spread = _spread(problem, fit, values)
+    spread = _spread(problem, fit, values, ids)
     sds = np.sqrt(np.append(np.diag(spread), [spread[1:, 1:].sum() / 4, spread[0, 0] * track**2]))
     means = [*values, (values[1] + values[2]) / 2, values[0] * track]
     separation, left, right, radius, apart = (
         Estimate(float(mean), float(mean - NORMAL90 * sd), float(mean + NORMAL90 * sd), unit)
         for mean, sd, unit in zip(means, sds, ("1", "1", "1", "1", "m"), strict=True)
     )
-    others = [each for each in best.candidates if each.id not in wheels]
-    whole = problem.fit_candidates([*others, *own], best.start).settings
     none = _Controller(np.ones(3), track)
-    before = max(np.linalg.norm(end) for end in _square(model, whole, none))
-    after = _square_within(model, whole, _Controller(values, track), spread)
+    before = max(np.linalg.norm(end) for end in _square(model, fit.settings, none))
+    after = _square_within(model, fit.settings, _Controller(values, track), spread)
     return Multipliers(separation, radius, left, right, apart, float(before), after)
 
 
-def _only_delays(model: Model, candidate: Candidate, best: Fit) -> bool:
-    """Tell whether, of what was found, an effect leaves steady rates as they are."""
-    settings = [setting for setting in best.settings if setting.id == candidate.id]
-    return bool(np.abs(_steady(model, settings) - _TRIED).max() < _SAME)
+def _in_proportion(model: Model, settings: Sequence[EffectSetting]) -> bool:
+    """Tell whether, with these effects, steady rates are in proportion to those asked for."""
+    steady = _steady(model, settings)
+    return bool(np.abs(steady - _TRIED @ _gains(steady).T).max() < _SAME)
+
+
+def _gains(steady: FloatArray) -> FloatArray:
+    """Return the matrix (2, 2) from rates asked for to steady rates (n, 2)."""
+    return np.stack([steady[0] / _TRIED[0, 0], steady[1] / _TRIED[1, 1]], axis=1)
 
 
 def _steady(model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
@@ -90,10 +96,9 @@ def _steady(model: Model, settings: Sequence[EffectSetting]) -> FloatArray:
     return np.array([[one.v[-1], one.w[-1]] for one in moved])
 
 
-def _values(model: Model, parameters: FloatArray, fit: Fit) -> FloatArray | None:
-    """Return the multipliers (3,) for a fit with these parameters; None where they make no sense."""
-    steady = _steady(model, settings_of(fit.terms, parameters))
-    gains = np.stack([steady[0] / _TRIED[0, 0], steady[1] / _TRIED[1, 1]], axis=1)
+def _values(model: Model, parameters: FloatArray, fit: Fit, ids: Collection[str]) -> FloatArray | None:
+    """Return the multipliers (3,) for a fit with these parameters, of effects of these ids; None for nonsense."""
+    gains = _gains(_steady(model, [setting for setting in settings_of(fit.terms, parameters) if setting.id in ids]))
     track = model.robot.track
     assert track is not None
     if not all(1 / _MOST < gain < _MOST for gain in (gains[0, 0], gains[1, 1])):
@@ -103,13 +108,14 @@ def _values(model: Model, parameters: FloatArray, fit: Fit) -> FloatArray | None
     return np.array([separation, gains[0, 0] - apart, gains[0, 0] + apart])
 
 
-def _spread(problem: Problem, fit: Fit, values: FloatArray) -> FloatArray:
+def _spread(problem: Problem, fit: Fit, values: FloatArray, ids: Collection[str]) -> FloatArray:
     """Return the covariance (3, 3) of the multipliers."""
     free = [i for i, term in enumerate(fit.terms) if not term.fixed]
     slopes = []
     for i in free:
         step = fit.terms[i].step * fit.terms[i].parameter.scale
-        moved = _values(problem.model, fit.values + np.where(np.arange(len(fit.terms)) == i, 0.01 * step, 0.0), fit)
+        parameters = fit.values + np.where(np.arange(len(fit.terms)) == i, 0.01 * step, 0.0)
+        moved = _values(problem.model, parameters, fit, ids)
         slopes.append(((values if moved is None else moved) - values) / 0.01)
     return np.asarray(np.array(slopes).T @ design.doubt(problem, fit.terms, fit.values) @ np.array(slopes))
 

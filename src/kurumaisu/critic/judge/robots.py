@@ -28,13 +28,14 @@ def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
         details.append(_assumption(robot))
     if found is not None:
         details.append(_in_words(found, robot))
+    better = found is not None and found.square_after < found.square_before
     told = replace(
         story,
         headline=_worded(story.headline, robot),
         details=tuple(details),
         unexplained=tuple(_worded(one, robot) for one in story.unexplained),
         provenance={**story.provenance, "robot": f"{robot.kind}{', assumed' if taken.assumed else ''}"},
-        paste=_paste(found) if found is not None else "",
+        paste=_paste(found) if found is not None and better else "",
     )
     return replace(criticism, verdict=replace(verdict, robot=taken), story=told)
 
