@@ -283,6 +283,46 @@ def test_what_was_found_of_wheels_can_be_pasted_read_and_run(found, tmp_path):
     assert moved.w[-500:].mean() == pytest.approx(curved, abs=0.01)
 
 
+def command_drives(changed, seed):
+    """Return two drives of a robot with the wheels that its software has, asked for rates that are changed (n, 2)."""
+    rng = np.random.default_rng(seed)
+    drives = {}
+    for name in ("one", "two"):
+        rates = np.column_stack([rng.uniform(-0.3, 0.4, 12), rng.uniform(-0.8, 0.8, 12)])
+        v, w = changed(rates).T
+        left, right = (
+            (v + side * w * TRACK / 2) * WHEELS["radius"] / radius for side, radius in ((-1.0, LEFT), (1.0, RIGHT))
+        )
+        asked = np.column_stack([(left + right) / 2, (right - left) / WHEELS["track"]])
+        t, poses = wheel_drive(asked, 5.0, rng)
+        command = np.column_stack([5.0 * np.arange(12), rates])
+        drives[name] = {"command": command, "pose": np.column_stack([t, poses])}
+    return drives
+
+
+def test_a_robot_as_its_software_has_it_is_told_to_change_nothing():
+    found = criticise_arrays(
+        command_drives(lambda rates: rates, 8), Meta(robot=robot(**WHEELS), truth=(0.003, 0.003)), only=["base.[glv]*"]
+    )
+    assert found.verdict.verdict == "none"
+    m = found.verdict.robot.multipliers
+    for name in ("wheel_separation", "left_wheel_radius", "right_wheel_radius"):
+        e = getattr(m, f"{name}_multiplier")
+        assert abs(e.estimate - 1.0) < 2 * (e.hi90 - e.lo90)
+    assert m.square_after < 0.1
+
+
+def test_a_top_speed_is_not_mended_by_wheels():
+    found = criticise_arrays(
+        command_drives(lambda rates: np.clip(rates, [-0.2, -9.0], [0.2, 9.0]), 9),
+        Meta(robot=robot(**WHEELS), truth=(0.003, 0.003)),
+        only=["base.[glvs]*"],
+    )
+    assert [cause.id for cause in found.verdict.causes] == ["base.saturation"]
+    e = found.verdict.robot.multipliers.wheel_radius_multiplier
+    assert abs(e.estimate - 1.0) < 0.02
+
+
 def test_an_extended_model_knows_its_robot_again(found, tmp_path):
     write(found, MODEL, tmp_path)
     (tmp_path / "again").mkdir()

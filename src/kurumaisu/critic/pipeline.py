@@ -29,7 +29,6 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
-from kurumaisu.params import Model
 from kurumaisu.whole_files import write_whole
 
 
@@ -49,23 +48,11 @@ def criticise(
     Raise Error when a run has no reference, nothing that drove the robot, or voltages of one that has none.
     """
     model = model_of(recording, model_file, assume_law=assume_law)
-    return with_robot(_criticised(recording, model, model_file, progress, ids, slam=slam), recording)
-
-
-def _criticised(
-    recording: Recording,
-    model: Model,
-    model_file: Path,
-    progress: Progress,
-    ids: frozenset[str] | None,
-    *,
-    slam: bool,
-) -> Criticism:
     recording = masks.set_aside(recording, model)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not withheld(recording, run)))
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
     if wrong:
-        return explain.invalid(recording, model, wrong)
+        return with_robot(explain.invalid(recording, model, wrong), recording)
     recording = with_sweep_time(bounded(recording), model)
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
@@ -74,7 +61,7 @@ def _criticised(
         whole = with_elapsed_time(recording)
         base, extension = criticise_drives(whole, model, progress, ids) if moved else (None, NOTHING)
         if base is not None and base.verdict.verdict == "invalid_data":
-            return base
+            return with_robot(base, recording)
         scans = scans_say(progress)
     found = base or explain.undriven(recording, model)
 
@@ -84,6 +71,7 @@ def _criticised(
     scans, settings = from_base_link(found.verdict.causes, scans, recording, model, again)
     found = with_scans(found, scans)
     found = with_gains(found, whole, replace(extension, scans=settings), progress, slam=slam)
+    found = with_robot(found, recording)
     if not predictions.asked(recording):
         return found
     progress("predicting what the queries ask for")

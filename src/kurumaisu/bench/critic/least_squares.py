@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 _SPAN = 2.0  # [s] over which motion is compared
 _ARM = 0.5  # [m] by which a turn counts as a way
@@ -52,14 +52,14 @@ def path(inputs: Inputs, values: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(inputs.times, edges, column) for column in (x, y, theta)])
 
 
-def moved(poses: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
+def moved(poses: FloatArray, starts: IntArray, ends: IntArray) -> FloatArray:
     """Return the motion (k, 3) from some rows of poses to others, in the frame of the first."""
     a, d = poses[starts], poses[ends] - poses[starts]
     c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
     return np.column_stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]])
 
 
-def ahead(times: FloatArray, seconds: float) -> tuple[FloatArray, FloatArray]:
+def ahead(times: FloatArray, seconds: float) -> tuple[IntArray, IntArray]:
     """Return the rows from which, and those to which, it is so long."""
     ends = np.searchsorted(times, times + seconds - 1e-6)
     starts = np.flatnonzero(ends < len(times))

@@ -21,16 +21,23 @@ from kurumaisu.critic.base.drive import GRID, Drive, prepare
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.excerpt import Excerpt, Moment, cut, span
 from kurumaisu.critic.data.reading import read_recording
+from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import Multipliers
 from kurumaisu.errors import Error
-from kurumaisu.params import FOLLOWER, EffectSetting, shipped, shipped_robot
+from kurumaisu.params import Robot, robot_of, shipped
+from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
 
 _MODEL = "launch/md100.yaml"
 _Result = TypeVar("_Result")
 _AFTER = (5.0, 20.0)  # [s]
-_KNOWN = ("create_r5", "create_r3", "lego_camera")  # public recordings, as docs/peers.md says
+# Public recordings (docs/peers.md), and what is said of their robots; odometry in metres needs no radius.
+_KNOWN: dict[str, dict[str, object]] = {
+    "create_r5": {"kind": "velocity"},
+    "create_r3": {"kind": "velocity"},
+    "lego_camera": {"kind": "diff_drive", "radius": 0.03, "track": 0.15},
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,13 +52,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if path is None or not path.exists():
             print(f"{name}: skipped, as it is not there: --recordings FOLDER says where it is")
             continue
-        _compare(path, options.fit)
+        _compare(path, options.fit, robot_of(Section({"robot": _KNOWN[name]}, name)))
     if options.draws > 0:
         squares.compare(options.draws, _multipliers)
     return 0
 
 
-def _compare(path: Path, seconds: float) -> None:
+def _compare(path: Path, seconds: float, robot: Robot) -> None:
     """Print a table of errors on the part of a recording that was not fitted."""
     whole = read_recording(path)
     first, last = span(whole.runs[0])
@@ -60,7 +67,7 @@ def _compare(path: Path, seconds: float) -> None:
         cut(whole.runs[0], Excerpt(Moment(a), Moment(b)), Faults())
         for a, b in ((first, first + seconds), (first + seconds, min(last, first + 3 * seconds)))
     ]
-    recording = replace(whole, runs=(parts[0],), train=(parts[0].name,), robot=shipped_robot(FOLLOWER))
+    recording = replace(whole, runs=(parts[0],), train=(parts[0].name,), robot=robot)
     model = replay.model_of(recording, shipped(_MODEL), assume_law=False)
     drives = [prepare(part, model) for part in parts]
     judged = _inputs(drives[1])
@@ -73,28 +80,38 @@ def _compare(path: Path, seconds: float) -> None:
     values, took = _timed(lambda: least_squares.fitted([_inputs(drives[0])]))
     table.row("least squares, 6 parameters", *_errors(judged, least_squares.path(judged, values)), took)
     try:
-        (found, words), took = _timed(lambda: _criticised(recording))
+        found, took = _timed(lambda: _criticised(recording))
     except Error as error:
         table.note(f"the critic: {error}")
         return
-    table.row("the critic", *_errors(judged, replay.path(drives[1], model, found)), took)
+    table.row("the critic", *_errors(judged, replay.path(drives[1], model, found.settings)), took)
+    taken = found.verdict.robot
+    if taken is not None and taken.multipliers is not None and robot.track is not None:
+        m = taken.multipliers
+        ahead, apart = m.wheel_radius_multiplier.estimate, m.wheel_separation_multiplier.estimate
+        curve = (
+            (m.right_wheel_radius_multiplier.estimate - m.left_wheel_radius_multiplier.estimate) / robot.track / apart
+        )
+        wheels = np.array([ahead, ahead / apart, curve / ahead, 0.0, 0.0, 0.0])
+        table.row("the critic's multipliers alone", *_errors(judged, least_squares.path(judged, wheels)), "-")
     names = ("gain v", "gain w", "turn per metre", "lag v", "lag w", "delay")
     told = ", ".join(f"{name} {value:.3g}" for name, value in zip(names, values, strict=True))
-    table.note(f"least squares: {told}. The critic: {words}. UMBmark does not apply: no squares in both directions.")
+    table.note(
+        f"least squares: {told}. The critic: {_words(found)}. UMBmark does not apply: no squares in both directions."
+    )
 
 
 def _multipliers(recording: Recording) -> Multipliers | None:
-    robot = pipeline.criticise(recording, shipped(_MODEL), lambda _: None).verdict.robot
+    robot = _criticised(recording).verdict.robot
     return None if robot is None else robot.multipliers
 
 
-def _criticised(recording: Recording) -> tuple[tuple[EffectSetting, ...], str]:
-    """Return what the critic extends the model by, without noise, and its verdict in words."""
-    criticism = pipeline.criticise(recording, shipped(_MODEL), lambda _: None)
-    return (
-        criticism.settings,
-        f"{criticism.verdict.verdict}: {', '.join(s.id for s in criticism.settings) or 'nothing'}",
-    )
+def _criticised(recording: Recording) -> Criticism:
+    return pipeline.criticise(recording, shipped(_MODEL), lambda _: None)
+
+
+def _words(found: Criticism) -> str:
+    return f"{found.verdict.verdict}: {', '.join(setting.id for setting in found.settings)}"
 
 
 def _timed(work: Callable[[], _Result]) -> tuple[_Result, float]:

@@ -135,11 +135,12 @@ def _square_within(
 def _square(model: Model, settings: Sequence[EffectSetting], controller: _Controller) -> FloatArray:
     """Return where a robot ends its square from its start [m], anticlockwise and clockwise, (2, 2), without noise."""
     ends = []
+    speed, turn = np.minimum((_SPEED, _TURN), model.robot.fastest or np.inf)
     for side in (1.0, -1.0):
         corner = [
-            Phase(_SIDE / _SPEED, (_SPEED, 0.0), 0.0),
+            Phase(_SIDE / speed, (speed, 0.0), 0.0),
             Phase(_REST, (0.0, 0.0), 0.0),
-            Phase(np.pi / 2 / _TURN, (0.0, side * _TURN), 0.0),
+            Phase(np.pi / 2 / turn, (0.0, side * turn), 0.0),
             Phase(_REST, (0.0, 0.0), 0.0),
         ]
         asked = controller.asked(samples(4 * corner, GRID)[:, 1:])

@@ -28,14 +28,13 @@ def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
         details.append(_assumption(robot))
     if found is not None:
         details.append(_in_words(found, robot))
-    better = found is not None and found.square_after < found.square_before
     told = replace(
         story,
         headline=_worded(story.headline, robot),
         details=tuple(details),
         unexplained=tuple(_worded(one, robot) for one in story.unexplained),
         provenance={**story.provenance, "robot": f"{robot.kind}{', assumed' if taken.assumed else ''}"},
-        paste=_paste(found) if found is not None and better else "",
+        paste=_paste(found) if found is not None else "",
     )
     return replace(criticism, verdict=replace(verdict, robot=taken), story=told)
 
@@ -54,14 +53,18 @@ def _in_words(found: Multipliers, robot: Robot) -> str:
     e = found.apparent_track
     track = f"as if its wheels were {with_interval(e.estimate, e.lo90, e.hi90, e.unit)} apart"
     before, after = quantities([found.square_before, found.square_after], "m")
-    return (
-        f"It {'skids, and ' if robot.skids else ''}turns {track}; its software has {robot.track:g} m. UMBmark's square "
-        f"of 4 m ends {before} from its start, with multipliers {after}, by what is not known of them, too."
-    )
+    square = f"UMBmark's square of 4 m ends {before} from its start"
+    if found.square_after < found.square_before:
+        square += f"; with the multipliers below {after}, their uncertainty included"
+    else:
+        square += "; these drives know of no multipliers that would surely close it better"
+    return f"It {'skids, and ' if robot.skids else ''}turns {track}; its software has {robot.track:g} m. {square}."
 
 
 def _paste(found: Multipliers) -> str:
-    """Return lines for the controller's YAML file."""
+    """Return lines for the controller's YAML file; nothing where they would be no better."""
+    if found.square_after >= found.square_before:
+        return ""
     rows = [("wheel_separation_multiplier", found.wheel_separation_multiplier)]
     left, right = found.left_wheel_radius_multiplier, found.right_wheel_radius_multiplier
     if abs(left.estimate - right.estimate) < _UNITY:
