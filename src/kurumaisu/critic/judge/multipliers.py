@@ -5,8 +5,8 @@ The controller turns its wheels by (v ± w b s / 2) / (r m): b, r are the track 
 multipliers of the track and of each side's radius. A robot whose steady rates are G times those that it is asked for
 has G_vv = (m_l + m_r) / 2, G_ww = G_vv / s and G_wv = (m_r - m_l) / (b s).
 
-They are fitted whether or not they differ from 1 enough for a cause to be named, beside all that was found; of that,
-what leaves rates in proportion counts as theirs, too.
+They are fitted whether or not they differ from 1 enough for a cause to be named, beside what was found, if that is
+needed; of that, what leaves rates in proportion counts as theirs, too.
 """
 
 from __future__ import annotations
@@ -61,7 +61,10 @@ def measured(problem: Problem, best: Fit) -> Multipliers | None:
     if track is None or {each.id for each in own} != wheels:
         return None
     others = [each for each in best.candidates if each.id not in wheels]
-    fit = problem.fit_candidates([*others, *own], best.start)
+    # What is out of proportion may stand for what a gain explains as well, where one speed alone was driven.
+    kept = [each for each in others if _in_proportion(model, [s for s in best.settings if s.id == each.id])]
+    fits = [problem.fit_candidates([*some, *own], best.start) for some in (kept, others)[: 1 + (kept != others)]]
+    fit = max(fits, key=lambda one: one.score)
     ids = {s.id for s in fit.settings if s.id in wheels or _in_proportion(model, [s])}
     values = _values(model, fit.values, fit, ids)
     if values is None:
