@@ -11,10 +11,12 @@ from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.meta import read_meta
 from kurumaisu.critic.engine.catalogue import catalogue
 from kurumaisu.critic.experiment.design import possible
+from kurumaisu.critic.experiment.rehearse import rehearse
 from kurumaisu.critic.values.verdict import read_verdict
 from kurumaisu.errors import Error
 from kurumaisu.experiments import shipped_script
 from kurumaisu.params import Robot, driven_as, load_model, robot_of, shipped, shipped_robot
+from kurumaisu.programs import sim
 from kurumaisu.settings import Section
 from kurumaisu.sim.plant import Plant
 
@@ -321,6 +323,19 @@ def test_a_top_speed_is_not_mended_by_wheels():
     assert [cause.id for cause in found.verdict.causes] == ["base.saturation"]
     e = found.verdict.robot.multipliers.wheel_radius_multiplier
     assert abs(e.estimate - 1.0) < 0.02
+
+
+def test_the_simulator_runs_it_and_records_no_voltages(found, tmp_path):
+    write(found, MODEL, tmp_path / "found")
+    extended = tmp_path / "found/extended.yaml"
+    drive = ["--model", str(extended), "-v", "0.3", "--seconds", "2", "-o", str(tmp_path / "driven")]
+    assert sim.main(drive) == 0
+    recording = read_recording(tmp_path / "driven")
+    assert recording.robot == robot(**WHEELS)
+    assert recording.runs[0].voltage is None
+    assert model_of(recording, extended, assume_law=False).robot == robot(**WHEELS)
+    with pytest.raises(Error, match="steering_sweep: asks for voltages, and diff_drive has none"):
+        rehearse("steering_sweep", extended, None, 1)
 
 
 def test_an_extended_model_knows_its_robot_again(found, tmp_path):

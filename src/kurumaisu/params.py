@@ -109,6 +109,13 @@ class Robot:
     ticks_per_turn: float | None = None
     fastest: tuple[float, float] | None = None
 
+    @property
+    def said(self) -> dict[str, object]:
+        """Return what a file says of it."""
+        known = {name: getattr(self, name) for name in ("kind", "radius", "track", "ticks_per_turn")}
+        fastest = {} if self.fastest is None else {"fastest": dict(zip("vw", self.fastest, strict=True))}
+        return {name: value for name, value in known.items() if value is not None} | fastest
+
 
 @dataclass(frozen=True)
 class Model:

@@ -12,7 +12,7 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.params import EffectSetting, Model, Robot, read_model
+from kurumaisu.params import EffectSetting, Model, read_model
 from kurumaisu.settings import Section, parsed
 
 _WIDE = {"min": -100.0, "max": 100.0, "resolution": 0.0}  # [V]
@@ -52,19 +52,12 @@ def extended_text(original: Path, model: Model, settings: Sequence[EffectSetting
         # The bands are in the volts of the file's own law.
         content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
     if not model.robot.voltages:
-        content["robot"] = _robot(model.robot)
+        content["robot"] = model.robot.said
         content["chassis"]["track"] = model.chassis.track
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
     where = f"{original} with what was found"
     read_model(Section(parsed(text, where), where))
     return f"# {original.name} and what the critic found in {' '.join(recording.split())}.\n{text}"
-
-
-def _robot(robot: Robot) -> dict[str, object]:
-    """Return a robot as a model file names it."""
-    said = {name: getattr(robot, name) for name in ("kind", "radius", "track", "ticks_per_turn")}
-    fastest = {} if robot.fastest is None else {"fastest": dict(zip("vw", robot.fastest, strict=True))}
-    return {name: value for name, value in said.items() if value is not None} | fastest
 
 
 def _axis(law: object) -> dict[str, dict[str, float]]:
