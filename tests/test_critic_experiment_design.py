@@ -12,7 +12,7 @@ from kurumaisu.critic.experiment.design import DrivePrediction, divergence, left
 from kurumaisu.errors import Error
 from kurumaisu.experiments import samples, shipped_script
 from kurumaisu.experiments.timeline import PERIOD
-from kurumaisu.params import follow_commands, load_model, shipped
+from kurumaisu.params import driven_as, load_model, shipped, shipped_robot
 
 MD100 = load_model(shipped("launch/md100.yaml"))
 
@@ -86,7 +86,7 @@ def test_the_plan_knows_what_the_textbook_knows():
     assert large["spin_both_ways"].nats == pytest.approx(4 * small["spin_both_ways"].nats, rel=0.25)
     assert small["straight_three_speeds"].nats == 0.0
     assert "steering_sweep" in small
-    assert "steering_sweep" not in rows("base.lag_w=0.05", model=follow_commands(MD100))
+    assert "steering_sweep" not in rows("base.lag_w=0.05", model=driven_as(MD100, shipped_robot("velocity")))
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,10 @@ from kurumaisu.critic.judge.overlays import overlays
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.noise.base_noise import START
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.params import EffectSetting, follow_commands, load_model, shipped
+from kurumaisu.params import EffectSetting, driven_as, load_model, shipped, shipped_robot
 
 MODEL = load_model(shipped("launch/md100.yaml"))
-COMMANDED = follow_commands(MODEL)
+COMMANDED = driven_as(MODEL, shipped_robot("velocity"))
 
 
 def driven(slip, gain, seconds=60.0, seed=4):

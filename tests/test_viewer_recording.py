@@ -18,7 +18,7 @@ from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.view.tape import laid
 from kurumaisu.errors import Error
-from kurumaisu.params import follow_commands, load_model, shipped
+from kurumaisu.params import driven_as, load_model, shipped, shipped_robot
 from kurumaisu.viewer.playback import CHAIR
 from kurumaisu.viewer.tape import Track
 from kurumaisu.whole_files import write_whole
@@ -121,7 +121,7 @@ def test_odometry_that_was_set_is_laid_anew():
 
 
 def test_the_simulated_drive_is_the_reports(two_runs):
-    model = follow_commands(load_model(shipped("launch/md100.yaml")))
+    model = driven_as(load_model(shipped("launch/md100.yaml")), shipped_robot("velocity"))
     run = drive("late", 5000.0)
     (overlay,) = overlays(Recording("r", (run,), ("late",)), model)
     with Look(two_runs) as look:

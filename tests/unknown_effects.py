@@ -17,11 +17,11 @@ from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.params import follow_commands, load_model, shipped
+from kurumaisu.params import driven_as, load_model, shipped, shipped_robot
 
 STEP = 0.005  # [s]
 USUAL = Noise(position_sd=0.005, heading_sd=0.005, sd_v=0.01, sd_lateral=0.003, sd_w=0.02, tau=0.3)
-MODEL = follow_commands(load_model(shipped("launch/md100.yaml")))
+MODEL = driven_as(load_model(shipped("launch/md100.yaml")), shipped_robot("velocity"))
 TRACK = MODEL.chassis.track
 
 

@@ -10,10 +10,14 @@ import numpy as np
 
 from kurumaisu import settings
 from kurumaisu._core import AxisLaw, Branch, LaserError
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
+from kurumaisu.names import hint, nearest
 from kurumaisu.types import FloatArray
 
 MOST_BEAMS = 100_000  # of a laser
+CHAIR, FOLLOWER = "md100", "velocity"  # robots that are taken where no file names one
+_ROBOTS = "launch/robots"
+IDENTITY = "identity"  # the voltage law of a robot that has no voltages
 
 
 @dataclass(frozen=True)
@@ -86,8 +90,36 @@ class EffectSetting:
 
 
 @dataclass(frozen=True)
+class Robot:
+    """What a robot is driven by.
+
+    kind: its file in launch/robots/; name, noun: what it is, and is called in sentences; voltages: whether it has any;
+    radius, track [m]: of its wheels as its software has them, None where it has none or nobody needs to know; skids:
+    whether its wheels must when it turns; ticks_per_turn: of a wheel's encoder, where wheels are recorded in ticks;
+    fastest: rates that it can be asked for [m/s, rad/s], None: all that scripts ask for.
+    """
+
+    kind: str
+    name: str
+    noun: str
+    voltages: bool
+    radius: float | None = None
+    track: float | None = None
+    skids: bool = False
+    ticks_per_turn: float | None = None
+    fastest: tuple[float, float] | None = None
+
+    @property
+    def said(self) -> dict[str, object]:
+        """Return what a file says of it."""
+        known = {name: getattr(self, name) for name in ("kind", "radius", "track", "ticks_per_turn")}
+        fastest = {} if self.fastest is None else {"fastest": dict(zip("vw", self.fastest, strict=True))}
+        return {name: value for name, value in known.items() if value is not None} | fastest
+
+
+@dataclass(frozen=True)
 class Model:
-    """The chair: what the simulator runs and the critic criticises."""
+    """The chair, or another robot: what the simulator runs and the critic criticises."""
 
     name: str
     law_name: str
@@ -98,6 +130,7 @@ class Model:
     chassis: Chassis
     laser: Laser
     effects: tuple[EffectSetting, ...]
+    robot: Robot
 
 
 def shipped(name: str) -> Path:
@@ -134,9 +167,61 @@ def read_model(top: settings.Section) -> Model:
         chassis=_chassis(top.section("chassis")),
         laser=_laser(top.section("laser")),
         effects=effects_of(top),
+        robot=robot_of(top) if "robot" in top else shipped_robot(CHAIR),
     )
     top.end()
     return model
+
+
+def shipped_robot(kind: str) -> Robot:
+    """Return a robot of this package of which nothing more need be said. Raise Error if there is none of that name."""
+    return _robot(kind, settings.Section({}, kind))
+
+
+def robot_of(top: settings.Section, folder: Path | None = None) -> Robot:
+    """Take the key `robot`: a name of launch/robots/, a mapping with it as its kind, or a file with such a mapping.
+
+    folder: where the file lies; None where no file may be named. Raise Error naming file and key.
+    """
+    said = top.text_or_section("robot", "kind")
+    kind = said.text("kind")
+    if folder is not None and kind.endswith(".yaml"):
+        said.end()
+        if (folder / kind).resolve().parent != folder.resolve():
+            raise said.error("kind", f"must be a file in the recording's folder: {told(kind)}")
+        said = settings.load(folder / kind)
+        kind = said.text("kind")
+    return _robot(kind, said)
+
+
+def _robot(kind: str, said: settings.Section) -> Robot:
+    names = sorted(path.stem for path in shipped(_ROBOTS).glob("*.yaml"))
+    if kind not in names:
+        near = f"{hint(kind, names)} " if nearest(kind, names) else ""
+        raise said.error("kind", f"there is no robot {told(kind)}; {near}there are: {', '.join(names)}")
+    file = settings.load(shipped(f"{_ROBOTS}/{kind}.yaml"))
+    driven_by = file.text("driven_by", ("voltages", "rates", "wheels"))
+    wheels = driven_by == "wheels"
+    robot = Robot(
+        kind,
+        file.text("name"),
+        file.text("noun"),
+        voltages=driven_by == "voltages",
+        radius=said.number("radius", above=0) if wheels else None,
+        track=said.number("track", above=0) if wheels else None,
+        skids=wheels and file.flag("skids"),
+        ticks_per_turn=said.number("ticks_per_turn", above=0) if wheels and "ticks_per_turn" in said else None,
+        fastest=_fastest(said.section("fastest")) if "fastest" in said else None,
+    )
+    for part in (file, said):
+        part.end()
+    return robot
+
+
+def _fastest(section: settings.Section) -> tuple[float, float]:
+    rates = section.number("v", above=0), section.number("w", above=0)
+    section.end()
+    return rates
 
 
 def effects_of(section: settings.Section) -> tuple[EffectSetting, ...]:
@@ -238,7 +323,12 @@ def identity_law() -> AxisLaw:
     return AxisLaw(Branch(1.0, 0.0), Branch(1.0, 0.0))
 
 
-def follow_commands(model: Model) -> Model:
-    """Return the model for a robot of another make: 1 V stands for 1 m/s and 1 rad/s, no dead zone."""
-    identity = identity_law()
-    return replace(model, name="velocity follows command", law_name="identity", translation=identity, steering=identity)
+def driven_as(model: Model, robot: Robot) -> Model:
+    """Return the model of a robot; one without voltages follows its commands: 1 V stands for 1 m/s and 1 rad/s."""
+    if robot.voltages:
+        return replace(model, robot=robot)
+    law = identity_law()
+    chassis = model.chassis if robot.track is None else replace(model.chassis, track=robot.track)
+    return replace(
+        model, name=robot.name, law_name=IDENTITY, translation=law, steering=law, chassis=chassis, robot=robot
+    )

@@ -97,6 +97,12 @@ class Section:
         """Return a required mapping."""
         return Section(self.take(key), self._where, f"{self._path}.{key}".lstrip("."))
 
+    def text_or_section(self, key: str, name: str) -> Section:
+        """Return a required mapping, or a string as the mapping that has it under a name."""
+        value = self.take(key)
+        values = {name: value} if isinstance(value, str) else value
+        return Section(values, self._where, f"{self._path}.{key}".lstrip("."))
+
     def names(self) -> list[str]:
         """Return the keys not yet taken."""
         return [key if isinstance(key, str) else told(key) for key in self._values]

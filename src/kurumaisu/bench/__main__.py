@@ -40,6 +40,7 @@ MODULES = {
     "odometry": "kurumaisu.bench.accuracy.odometry",
     "slam": "kurumaisu.bench.slam.main",
     "slam_localise": "kurumaisu.bench.slam.localise",
+    "peers": "kurumaisu.bench.critic.peers",
     "predict": "kurumaisu.bench.critic.predict",
     "paper": "kurumaisu.bench.paper.drive",
     "paper_scans": "kurumaisu.bench.paper.scans",

@@ -16,6 +16,7 @@ from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, with
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
@@ -42,18 +43,16 @@ def criticise(
 ) -> Criticism:
     """Return the criticism of a model by a recording whose runs have reference poses.
 
-    Without voltages a robot that is asked for more than the model's voltages can say has none: "velocity follows
-    command", unless the recording names a model or assume_law says that it has the model's voltage law. ids: the
-    effects that may be named; None for all that are criticised. slam: whether SLAM is run with both models on a run
-    held out, which takes some seconds.
-    Raise Error when a run has no reference, or nothing that drove the robot.
+    Which robot it is of: see model_of. ids: the effects that may be named; None for all that are criticised. slam:
+    whether SLAM is run with both models on a run held out, which takes some seconds.
+    Raise Error when a run has no reference, nothing that drove the robot, or voltages of one that has none.
     """
     model = model_of(recording, model_file, assume_law=assume_law)
     recording = masks.set_aside(recording, model)
     whole = replace(recording, runs=tuple(run for run in recording.runs if not withheld(recording, run)))
     wrong = [*recording.invalid, *examination.examine(whole, model).invalid]
     if wrong:
-        return explain.invalid(recording, model, wrong)
+        return with_robot(explain.invalid(recording, model, wrong), recording)
     recording = with_sweep_time(bounded(recording), model)
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
@@ -62,7 +61,7 @@ def criticise(
         whole = with_elapsed_time(recording)
         base, extension = criticise_drives(whole, model, progress, ids) if moved else (None, NOTHING)
         if base is not None and base.verdict.verdict == "invalid_data":
-            return base
+            return with_robot(base, recording)
         scans = scans_say(progress)
     found = base or explain.undriven(recording, model)
 
@@ -72,6 +71,7 @@ def criticise(
     scans, settings = from_base_link(found.verdict.causes, scans, recording, model, again)
     found = with_scans(found, scans)
     found = with_gains(found, whole, replace(extension, scans=settings), progress, slam=slam)
+    found = with_robot(found, recording)
     if not predictions.asked(recording):
         return found
     progress("predicting what the queries ask for")

@@ -134,6 +134,11 @@ _NOTHING = Chain()
 _Acting = TypeVar("_Acting", bound=Mechanism)
 
 
+def of_base(*, voltages: bool) -> tuple[type[BaseEffect], ...]:
+    """Return the effects on the base that a robot can have, with voltages or without."""
+    return tuple(effect for effect in BASE if voltages or not effect.of_voltages)
+
+
 def by_id(name: str) -> type[Mechanism]:
     """Return the effect of an id, be it a smooth one. Raise Error when it is neither that nor in the catalogue."""
     known = _BY_ID.get(name)
@@ -273,6 +278,7 @@ __all__ = [
     "factor",
     "fluctuation",
     "incidence",
+    "of_base",
     "of_world",
     "slanted",
     "smooth_id",

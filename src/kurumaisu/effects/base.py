@@ -111,11 +111,15 @@ class Context:
 class BaseEffect(Mechanism):
     """An effect somewhere in the drive chain. shows_in, follows: where a residual drawn over it shows its shape.
 
-    in_odometry: whatever it does, odometry has it, whether of the wheels or of what was put out.
+    in_odometry: whatever it does, odometry has it, whether of the wheels or of what was put out; of_voltages: it acts
+    on voltages, so that a robot without them cannot have it; of_wheels: it is what other radii and another track of two
+    sides of wheels do.
     """
 
     stage: ClassVar[Stage]
     in_odometry: ClassVar[bool] = False
+    of_voltages: ClassVar[bool] = False
+    of_wheels: ClassVar[bool] = False
     shows_in: ClassVar[Rate]
     follows: ClassVar[Follows]
 
@@ -137,6 +141,8 @@ class Effect(BaseEffect, ABC):
 
 class VoltageEffect(BaseEffect, ABC):
     """An effect on the voltages, before they become rates."""
+
+    of_voltages = True
 
     @abstractmethod
     def apply(self, volts: Volts) -> Volts:

@@ -31,6 +31,7 @@ class CrossVToW(Effect):
 
     id = "base.cross_v_to_w"
     stage = Stage.GAIN
+    of_voltages = True
     parameters = (Parameter("share", "1", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
     sentence = "the translation voltage leaks into the steering"
     formula = "w + share · V_f(v) · gain of V_s(w)"

@@ -43,7 +43,7 @@ class DeadZoneV(Effect):
     parameters = _PARAMETERS
     forms = _FORMS
     empirical = True
-    sentence = "small translation voltages have no effect: the dead zone of V_f is wider than modelled"
+    sentence = "small forward speeds that are asked for have no effect: their dead zone is wider than modelled"
     formula = "sign(v) · max(0, |v| − width · |gain of V_f|), or with whole = 1: 0 up to there, beyond it v"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.V
@@ -62,7 +62,7 @@ class DeadZoneW(Effect):
     parameters = _PARAMETERS
     forms = _FORMS
     empirical = True
-    sentence = "small steering voltages have no effect: the dead zone of V_s is wider than modelled"
+    sentence = "small yaw rates that are asked for have no effect: their dead zone is wider than modelled"
     formula = "sign(w) · max(0, |w| − width · |gain of V_s|), or with whole = 1: 0 up to there, beyond it w"
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.W

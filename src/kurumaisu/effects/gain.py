@@ -13,6 +13,7 @@ class GainV(Effect):
 
     id = "base.gain_v"
     stage = Stage.GAIN
+    of_wheels = True
     parameters = _GAIN
     sentence = "the chair drives faster or slower than commanded, in proportion to the speed"
     formula = "v · (1 + gain)"
@@ -30,6 +31,7 @@ class GainW(Effect):
 
     id = "base.gain_w"
     stage = Stage.GAIN
+    of_wheels = True
     parameters = _GAIN
     sentence = "the chair turns more or less than commanded, in proportion to the yaw rate (effective track)"
     formula = "w · (1 + gain)"

@@ -68,6 +68,11 @@ class Mechanism:
         return dict(cls.forms[0]) if cls.forms else {}
 
     @classmethod
+    def forms_of(cls, track: float | None) -> tuple[Mapping[str, float], ...]:
+        """Return the forms that a robot may show whose wheels are so far apart [m]; None: as far as a wheelchair's."""
+        return cls.forms
+
+    @classmethod
     def check(cls, values: Mapping[str, float]) -> None:
         """Raise Error for a parameter that is missing, unknown or out of its bounds."""
         names = [parameter.name for parameter in cls.parameters]

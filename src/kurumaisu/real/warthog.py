@@ -150,4 +150,5 @@ def _wheels(log: Log, folder: Path) -> Path:
     return recording(
         folder,
         {name: {"odom": between(nominal, *span), "pose": between(log.pose, *span)} for name, span in spans.items()},
+        robot={"kind": "skid_steer", "radius": RADIUS, "track": TRACK},
     )

@@ -15,13 +15,14 @@ from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.csv_reader import OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.data.meta import Meta, recording_of_meta
+from kurumaisu.critic.data.odometry import with_wheels
 from kurumaisu.critic.data.reading import require_use, split
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run, Series, run_of_parts
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error
-from kurumaisu.params import shipped
+from kurumaisu.params import Robot, shipped
 from kurumaisu.types import FloatArray
 
 Tables = Mapping[str, ArrayLike]
@@ -40,8 +41,8 @@ def criticise_arrays(
 
     runs: by name, tables whose first column is t [s]: command (n, 3) of t, v, w; voltage (n, 3) of t, v_f, v_s, or
     (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta, or (n, 3) without theta; odom (n, 6) of t,
-    x, y, theta, v, w, or (n, 4) without v, w; scan (n, 1 + beams); query (n, 2) of t0, t1; any other name: a covariate,
-    (n, 2). SI units, radians. meta: what meta.yaml would say.
+    x, y, theta, v, w, or (n, 4) without v, w; wheels or wheel_rates (n, 3) of t, left, right; scan (n, 1 + beams);
+    query (n, 2) of t0, t1; any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml would say.
     only, without: ids or patterns of effects; seed: of the particle filter that makes a missing reference.
     Raise Error naming run and table, or effect, for what cannot be used.
     """
@@ -53,7 +54,7 @@ def criticise_arrays(
 def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording:
     """Return arrays as a recording, cleaned as tables are. Raise Error naming what does not fit."""
     faults = Faults()
-    made = [run_of(run, tables, faults, meta.command_hold) for run, tables in runs.items()]
+    made = [run_of(run, tables, faults, meta.command_hold, meta.robot) for run, tables in runs.items()]
     if not made:
         raise Error(f"{name}: no run is given")
     for run in made:
@@ -63,10 +64,10 @@ def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording
     return recording_of_meta(name, made, meta, faults, train=train, test=test)
 
 
-def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None) -> Run:
+def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None, robot: Robot | None = None) -> Run:
     """Return the tables of one drive as a run; faults gets what was found wrong, hold: as completed has it.
 
-    Raise Error naming a misshapen table.
+    robot: whose wheels they tell of. Raise Error naming a misshapen table.
     """
     parts: dict[str, Series | None] = {}
     covariates: dict[str, Series] = {}
@@ -84,6 +85,7 @@ def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None)
             parts[part] = series
         elif series is not None:
             covariates[part] = series
+    with_wheels(name, parts, robot)
     return completed(replace(run_of_parts(name, parts, covariates), queries=queries), hold, faults)
 
 

@@ -47,8 +47,8 @@ class Job:
 class Outcome:
     """What came of a job after so many seconds of wall time.
 
-    next_drive: what to drive next, or empty; error: why there is no verdict, on one line; trace: the stack, where that
-    is the critic's own fault.
+    next_drive: what to drive next, paste: lines for the robot's own software, or empty; error: why there is no
+    verdict, on one line; trace: the stack, where that is the critic's own fault.
     """
 
     job: Job
@@ -57,6 +57,7 @@ class Outcome:
     headline: str = ""
     details: tuple[str, ...] = ()
     next_drive: str = ""
+    paste: str = ""
     error: str = ""
     trace: str = ""
 
@@ -83,7 +84,7 @@ def run(job: Job, progress: Callable[[str], None]) -> Outcome:
         return Outcome(job, time.monotonic() - start, error=words, trace=traceback.format_exc())
     seconds = time.monotonic() - start
     story = criticism.story
-    return Outcome(job, seconds, criticism.verdict, story.headline, story.details, story.next_drive)
+    return Outcome(job, seconds, criticism.verdict, story.headline, story.details, story.next_drive, story.paste)
 
 
 def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:

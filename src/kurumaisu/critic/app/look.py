@@ -90,6 +90,8 @@ def look(path: Path, wanted: Sequence[str] = ()) -> Iterator[str]:
 
 def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
     """Yield, for each verdict, whether the runs serve for it, or what is missing."""
+    assumed = "not said: an MD-100, or one without voltages, is assumed; see `robot` in docs/recording.md"
+    yield f"robot: {meta.robot.kind if meta.robot else assumed}"
     inputs = [run for run in runs if run.command or run.voltage]
     posed = [run for run in inputs if run.pose or run.odom]
     if posed:

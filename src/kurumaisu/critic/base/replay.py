@@ -14,7 +14,8 @@ import numpy as np
 from kurumaisu import effects, geometry
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.values.recording import Recording, Series
-from kurumaisu.params import EffectSetting, Model, follow_commands, load_model
+from kurumaisu.errors import Error
+from kurumaisu.params import FOLLOWER, EffectSetting, Model, driven_as, load_model, shipped_robot
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
@@ -23,18 +24,30 @@ _UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are le
 
 
 def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
-    """Return the model that a recording is compared with.
+    """Return the model that a recording is compared with: of the robot that it names, or that the model file does.
 
-    It is "velocity follows command" where no voltages were recorded and commands ask for more than those of the model
-    can say: that is a robot of another make. Else, and where the recording names a model or assume_law says that the
-    robot has the model's voltage law, commands become voltages by that law, and rates again: the same, until something
-    happens to the voltages.
+    Where neither does, it is "velocity follows command" if no voltages were recorded and commands ask for more than
+    those of the model can say: that is a robot of another make. Else, and where the recording names a model or
+    assume_law says that the robot has the model's voltage law, commands become voltages by that law, and rates again:
+    the same, until something happens to the voltages.
+    Raise Error where voltages of a robot were recorded that has none.
     """
     model = load_model(model_file)
-    if assume_law or recording.model is not None or any(run.voltage is not None for run in recording.runs):
+    model = driven_as(model, recording.robot or model.robot)
+    volts = [run.name for run in recording.runs if run.voltage is not None]
+    if volts and not model.robot.voltages:
+        raise Error(
+            f"{recording.name}: robot: {model.robot.kind} has no voltages, but voltages of {volts[0]} are given"
+        )
+    if robot_said(recording, model) or assume_law or recording.model is not None or volts:
         return model
     commands = [run.command for run in recording.runs if run.command is not None]
-    return model if all(_sayable(model, command) for command in commands) else follow_commands(model)
+    return model if all(_sayable(model, command) for command in commands) else driven_as(model, shipped_robot(FOLLOWER))
+
+
+def robot_said(recording: Recording, model: Model) -> bool:
+    """Tell whether the recording, or the file of the model criticised, says which robot it is."""
+    return recording.robot is not None or not (model.robot.voltages or model.robot.kind == FOLLOWER)
 
 
 def _sayable(model: Model, command: Series) -> bool:

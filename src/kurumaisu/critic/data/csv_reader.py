@@ -15,9 +15,11 @@ import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.odometry import with_wheels
 from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
+from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
 
 if TYPE_CHECKING:
@@ -29,6 +31,8 @@ REQUIRED: dict[str, tuple[str, ...]] = {
     "voltage": ("v_f", "v_s"),
     "pose": ("x", "y"),
     "odom": ("x", "y", "theta"),
+    "wheels": ("left", "right"),
+    "wheel_rates": ("left", "right"),
     "scan": (),
     "covariate": (),
 }
@@ -48,8 +52,8 @@ def is_csv_run(folder: Path) -> bool:
     return tables or any((folder / f"{name}{SUFFIX}").is_file() for name in _TRAJECTORIES)
 
 
-def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
-    """Read the tables of a folder; a table that is not there is a missing part.
+def read_csv_run(folder: Path, name: str, faults: Faults, robot: Robot | None = None) -> Run:
+    """Read the tables of a folder; a table that is not there is a missing part. robot: whose wheels they tell of.
 
     Raise Error naming file, line and column for what cannot be read.
     """
@@ -71,6 +75,7 @@ def read_csv_run(folder: Path, name: str, faults: Faults) -> Run:
                 raise Error(f"{path}: there is a {part}.csv, too: one or the other")
             t, rows = read_tum(path)
             parts[part] = clean(Table(f"{name}/{path.name}", t, rows, ("x", "y", "theta"), "row", 1), faults)
+    with_wheels(str(folder), parts, robot)
     query = folder / f"{QUERY}.csv"
     return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.exists() else None)
 

@@ -12,7 +12,7 @@ from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.odometry import Wheels
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error, told
-from kurumaisu.params import MOST_BEAMS, shipped
+from kurumaisu.params import MOST_BEAMS, Robot, robot_of, shipped
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,7 @@ class Meta:
     frames: tuple[str, str] | None = None
     wheels: Wheels | None = None
     command_hold: float | None = None
+    robot: Robot | None = None
 
 
 def recording_of_meta(
@@ -48,6 +49,7 @@ def recording_of_meta(
         world=meta.world,
         laser=meta.laser,
         truth=meta.truth,
+        robot=meta.robot,
         problems=tuple(faults.notes),
         invalid=tuple(faults.invalid),
     )
@@ -59,6 +61,7 @@ def read_meta(path: Path) -> Meta:
     Raise Error naming file and key.
     """
     top = settings.load(path)
+    robot = robot_of(top, path.parent) if "robot" in top else None
     meta = Meta(
         model=_file(top, "model", path.parent, "launch") if "model" in top else None,
         world=_file(top, "world", path.parent, "") if "world" in top else None,
@@ -68,8 +71,9 @@ def read_meta(path: Path) -> Meta:
         test=_names(top, "test") if "test" in top else (),
         topics=_topics(top.section("topics")) if "topics" in top else {},
         frames=_frames(top.section("reference")) if "reference" in top else None,
-        wheels=_wheels(top.section("wheels")) if "wheels" in top else None,
+        wheels=_wheels(top.section("wheels"), robot) if "wheels" in top else None,
         command_hold=top.number("command_hold", above=0) if "command_hold" in top else None,
+        robot=robot,
     )
     top.end()
     both = sorted(set(meta.train) & set(meta.test))
@@ -135,7 +139,7 @@ def _frames(section: settings.Section) -> tuple[str, str]:
     return frames[0].lstrip("/"), frames[1].lstrip("/")
 
 
-def _wheels(section: settings.Section) -> Wheels:
+def _wheels(section: settings.Section, robot: Robot | None) -> Wheels:
     topic = section.text("topic") if "topic" in section else ""
     sides = []
     for side in ("left", "right"):
@@ -144,6 +148,12 @@ def _wheels(section: settings.Section) -> Wheels:
         if not names or not all(isinstance(name, str) and name for name in names):
             raise section.error(side, f"must be the name of a joint, or a list of them: {told(given)}")
         sides.append(tuple(names))
-    wheels = Wheels(sides[0], sides[1], section.number("radius", above=0), section.number("track", above=0), topic)
+    # What is said of the robot need not be said again.
+    known = {} if robot is None or robot.radius is None or robot.track is None else vars(robot)
+    radius, track = (
+        section.number(key, above=0) if key in section or not known else float(known[key])
+        for key in ("radius", "track")
+    )
+    wheels = Wheels(sides[0], sides[1], radius, track, topic, known.get("ticks_per_turn"))
     section.end()
     return wheels

@@ -8,25 +8,57 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.critic.values.recording import Series
+from kurumaisu.errors import Error
+from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
 
 COLUMNS = ("x", "y", "theta", "v", "w")
+WHEEL_TABLES = ("wheels", "wheel_rates")  # of angles or ticks, of rates
 
 
 @dataclass(frozen=True)
 class Wheels:
-    """Wheels driven apart from each other. radius, track [m]; left, right: joints of `topic`, or topics of numbers."""
+    """Wheels driven apart from each other. radius, track [m]; left, right: joints of `topic`, or topics of numbers.
+
+    ticks_per_turn: of what the numbers count; None: they are rates [rad/s].
+    """
 
     left: tuple[str, ...]
     right: tuple[str, ...]
     radius: float
     track: float
     topic: str = ""
+    ticks_per_turn: float | None = None
 
     def motion(self, wheels: FloatArray) -> FloatArray:
         """Return way and turn, (n, 2), of angles of the left and the right wheel, (n, 2), or the rates of rates."""
         left, right = self.radius * wheels.T
         return np.stack([(left + right) / 2, (right - left) / self.track], axis=1)
+
+
+def with_wheels(where: str, parts: dict[str, Series | None], robot: Robot | None) -> None:
+    """Put the odometry in place of tables of wheels: of angles [rad] or ticks, or of rates [rad/s].
+
+    Raise Error naming where, if there is other odometry, or nothing says how large the wheels are.
+    """
+    given = [name for name in WHEEL_TABLES if parts.get(name) is not None]
+    for name in given:
+        if len(given) > 1 or "odom" in parts:
+            raise Error(
+                f"{where}/{name}: is odometry, and so is {'odom' if 'odom' in parts else given[1]}: one of them"
+            )
+        if robot is None or robot.radius is None or robot.track is None:
+            raise Error(f"{where}/{name}: how large the wheels are is not said: `robot` in meta.yaml, radius and track")
+        wheels = Wheels((), (), robot.radius, robot.track)
+        table = parts.pop(name)
+        assert table is not None
+        angles = name == WHEEL_TABLES[0]
+        share = 2 * np.pi / robot.ticks_per_turn if angles and robot.ticks_per_turn is not None else 1.0
+        moved = wheels.motion(share * (np.diff(table.values, axis=0) if angles else table.values))
+        poses = along(moved) if angles else driven_by(table.t, moved)
+        rates = rates_between(table.t, poses) if angles else moved
+        parts["odom"] = Series(table.t, np.column_stack([poses, rates]), COLUMNS)
 
 
 def rates_between(t: FloatArray, poses: FloatArray) -> FloatArray:

@@ -113,7 +113,7 @@ def read_run(
 
 def _read(source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None) -> tuple[Run, LaserMount | None]:
     if source.is_dir() and not is_bag(source):
-        return read_csv_run(source, source.resolve().name, faults), None
+        return read_csv_run(source, source.resolve().name, faults, meta.robot), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
     if is_carmen(source):

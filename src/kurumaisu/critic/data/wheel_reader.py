@@ -75,14 +75,17 @@ def _side(message: Any, names: Sequence[str]) -> tuple[float, float] | None:
 
 
 def _rates(path: Path, wheels: Wheels) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
-    """Return times of the left wheel, and both wheels' rates there."""
+    """Return times of the left wheel, both wheels' rates or angles there, and whether they are angles."""
     sides = [[absolute(name) for name in names] for names in (wheels.left, wheels.right)]
     found = read_topics(path, {name: _number for names in sides for name in names})
     for name in (name for names in sides for name in names if name not in found):
         raise Error(f"{path}: wheels: there is no topic {name}; for joints of a JointState, say wheels.topic too")
     t = found[sides[0][0]].times()
     left, right = (np.mean([_at(t, found[name]) for name in names], axis=0) for names in sides)
-    return t, left, right, False
+    if wheels.ticks_per_turn is None:
+        return t, left, right, False
+    share = 2 * np.pi / wheels.ticks_per_turn
+    return t, share * left, share * right, True
 
 
 def _number(kind: str) -> Any:

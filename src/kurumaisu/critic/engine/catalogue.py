@@ -84,7 +84,7 @@ def catalogue(model: Model, ids: frozenset[str] | None = None) -> tuple[Term, ..
     own = {setting.id: setting.parameters for setting in model.effects}
     return tuple(
         Term(effect.id, parameter, own.get(effect.id, {}).get(parameter.name, parameter.null))
-        for effect in effects.BASE
+        for effect in effects.of_base(voltages=model.robot.voltages)
         if not effect.random and not effect.choices and (ids is None or effect.id in ids)
         for parameter in effect.parameters
         if effect.id in own or all(parameter.name not in form for form in effect.forms)
@@ -178,7 +178,7 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
     """Return the ways in which the effects of these terms may act, and those that can act or not; ids: among these."""
     found: list[Candidate] = []
     own = {setting.id for setting in model.effects}
-    for effect in effects.BASE:
+    for effect in effects.of_base(voltages=model.robot.voltages):
         if effect.choices and effect.id not in own:
             found += _choices(effect) if ids is None or effect.id in ids else []
             continue
@@ -188,7 +188,7 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
             continue
         sizes = range(1, len(amplitudes) + 1) if effect.separable else [len(amplitudes)]
         subsets = [subset for size in sizes for subset in combinations(amplitudes, size)]
-        forms = () if effect.id in own else effect.forms
+        forms = () if effect.id in own else effect.forms_of(model.robot.track)
         for terms_of, ways, usual in _forms(effect, forms):
             # Of a converter nothing is smooth: what an unusual form makes of large sizes, nobody has looked at.
             simple = usual or effect.stage > effects.Stage.CONVERTER
@@ -208,7 +208,8 @@ def _forms(
         yield (), 1.0, True
     for i, form in enumerate(forms):
         fixed = tuple(_fixed(effect.id, parameter, form) for parameter in effect.parameters if parameter.name in form)
-        yield fixed, (len(forms) - 1) / (1 - _USUAL) if i else 1 / _USUAL, i == 0
+        usual = _USUAL if len(forms) > 1 else 1.0
+        yield fixed, (len(forms) - 1) / (1 - usual) if i else 1 / usual, i == 0
 
 
 def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:

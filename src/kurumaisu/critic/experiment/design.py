@@ -53,8 +53,13 @@ class DrivePrediction:
 
 
 def possible(script: Script, model: Model) -> bool:
-    """Return False for voltages where a model has none."""
-    return script.kind != "sweep" or model.law_name != "identity"
+    """Return False for voltages where a robot has none, and for rates that it cannot be asked for."""
+    if script.kind != "drive":
+        return script.kind != "sweep" or model.robot.voltages
+    fastest = model.robot.fastest
+    return fastest is None or all(
+        abs(v) <= fastest[0] and abs(w) <= fastest[1] for v, w in (phase.target for phase in script.phases)
+    )
 
 
 def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> Drive:

@@ -46,6 +46,8 @@ class Rehearsal:
         rows = samples(script.phases, self._manner.period)
         t = rows[:, 0]
         if script.kind == "sweep":
+            if not self._model.robot.voltages:
+                raise Error(f"{script.name}: asks for voltages, and {self._model.robot.kind} has none")
             unknown = np.full(len(t), np.nan)
             return {"voltage": np.column_stack([t, np.zeros(len(t)), rows[:, 1], unknown, unknown])}
         return {"command": rows, "voltage": simulated.voltages(self._model, self._manner.limits, rows)}

@@ -71,6 +71,8 @@ def write(folder: Path, recording: Recording) -> None:
     meta: dict[str, object] = {} if laser is None else {"laser": laser.known}
     if truth is not None:
         meta["truth"] = {"position_sd": truth[0], "heading_sd": truth[1]}
+    if recording.robot is not None:
+        meta["robot"] = recording.robot.said
     write_whole({folder / "meta.yaml": yaml.safe_dump(meta, sort_keys=False)})
 
 

@@ -68,6 +68,8 @@ class Notes:
         )
         beams = tuple(f"r{i}" for i in range(self._model.laser.beams))
         command, voltage = inputs.get("command"), inputs.get("voltage")
+        if voltage is not None and not self._model.robot.voltages:
+            command, voltage = voltage[:, [0, 3, 4]], None  # what the limits left of what was asked for
         known = () if voltage is None or np.isnan(voltage[:, 3]).any() else ("v", "w")
         return Run(
             name,
@@ -88,4 +90,5 @@ def recording(name: str, runs: list[Run], model: Model, manner: Manner) -> Recor
         train=tuple(run.name for run in runs),
         laser=LaserMount(mount.x, mount.y, mount.yaw, laser.angle_min, laser.angle_increment, laser.beams),
         truth=sd if min(sd) > 0 else None,
+        robot=None if model.robot.voltages else model.robot,
     )

@@ -14,7 +14,7 @@ from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
 from kurumaisu.critic.heldout.materiality import share_of_way
-from kurumaisu.critic.judge import excitation, explain, explain_unknown, unresolved
+from kurumaisu.critic.judge import excitation, explain, explain_unknown, multipliers, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
@@ -26,7 +26,7 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import Gain
+from kurumaisu.critic.values.verdict import Gain, RobotTaken
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 
@@ -66,6 +66,8 @@ def criticise_drives(
     best = made.found.best.settings
     shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
     judged = unresolved.with_unresolved(judged, made, held, shares, test)
+    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=multipliers.measured(made.problem, made.found.best))
+    judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
 
 

@@ -51,6 +51,9 @@ def extended_text(original: Path, model: Model, settings: Sequence[EffectSetting
         }
         # The bands are in the volts of the file's own law.
         content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
+    if not model.robot.voltages:
+        content["robot"] = model.robot.said
+        content["chassis"]["track"] = model.chassis.track
     text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
     where = f"{original} with what was found"
     read_model(Section(parsed(text, where), where))

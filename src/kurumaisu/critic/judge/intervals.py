@@ -160,6 +160,7 @@ def _step_end(fallen: Callable[[float], float], sign: float, size: float) -> flo
 def _estimate(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:
     """Return a fitted parameter with its 90 % interval, which its bounds cut."""
     unit = term.parameter.unit
-    if unit == "V" and model.law_name == "identity":
-        unit = "V (1 V stands for 1 m/s or 1 rad/s)"
+    if unit == "V" and not model.robot.voltages:
+        # Its volts are what it is asked for.
+        unit = "m/s" if getattr(effects.by_id(term.id), "shows_in", None) is effects.Rate.V else "rad/s"
     return Estimate(float(value), max(low, term.parameter.lower), min(high, term.parameter.upper), unit)

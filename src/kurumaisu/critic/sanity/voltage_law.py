@@ -41,7 +41,7 @@ def _rates(run: Run, driven: Rates, model: Model) -> Iterator[Rates]:
     """Yield the rates of a simulated chair by each of the other laws, as means about the same times."""
     drive = prepare(run, model)
     times = drive.start + GRID * np.arange(len(drive.v))
-    for effect in effects.BASE:
+    for effect in effects.of_base(voltages=model.robot.voltages):
         for choice in effect.choices if issubclass(effect, effects.VoltageEffect) else ():
             motion = replay.motion(drive, model, [EffectSetting(effect.id, dict(choice))])
             yield rates.of_input(times, np.column_stack([motion.v, motion.w]), driven.t)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
 
 
@@ -102,7 +103,7 @@ class Recording:
     train, test: names of runs; test is empty when gain is measured by leaving one run out.
     truth: sd of the reference pose, position [m] and heading [rad]; None = the critic estimates it.
     problems: all that the reader found wrong and mended or dropped, in words;
-    invalid: those of the problems that forbid a verdict on causes.
+    invalid: those of the problems that forbid a verdict on causes; robot: what is said of it, None where nothing is.
     """
 
     name: str
@@ -115,3 +116,4 @@ class Recording:
     truth: tuple[float, float] | None = None
     problems: tuple[str, ...] = ()
     invalid: tuple[str, ...] = ()
+    robot: Robot | None = None

@@ -118,6 +118,7 @@ class Story:
 
     headline: the verdict in one sentence; details: what a reader should know next, one sentence each;
     unexplained: what remains, one sentence each; next_drive: what to drive next and why, or empty;
+    paste: lines for the configuration of the robot's own software, or empty;
     pose_source: where the reference pose came from; provenance: seeds, versions, files, by name.
     """
 
@@ -134,3 +135,4 @@ class Story:
     noise: tuple[NoiseParameter, ...] = ()
     unexplained: tuple[str, ...] = ()
     next_drive: str = ""
+    paste: str = ""

@@ -125,6 +125,33 @@ class Gain:
 
 
 @dataclass(frozen=True)
+class Multipliers:
+    """What ROS's diff_drive_controller takes for what was named.
+
+    wheel_radius_multiplier: of both wheels; where it is given, the controller does not look for the left and the right
+    one. apparent_track: distance of wheels [m] that would turn the robot as it turns. square_before, square_after: how
+    far the robot is from its start [m] after UMBmark's square, the worse of both directions, without and with them.
+    """
+
+    wheel_separation_multiplier: Estimate
+    wheel_radius_multiplier: Estimate
+    left_wheel_radius_multiplier: Estimate
+    right_wheel_radius_multiplier: Estimate
+    apparent_track: Estimate
+    square_before: float
+    square_after: float
+
+
+@dataclass(frozen=True)
+class RobotTaken:
+    """The robot that a recording was taken to be of, by its file in launch/robots/; assumed: nothing said so."""
+
+    kind: str
+    assumed: bool
+    multipliers: Multipliers | None = None
+
+
+@dataclass(frozen=True)
 class Verdict:
     """The critic's answer. gain is None where nothing could be held out or simulated."""
 
@@ -135,6 +162,7 @@ class Verdict:
     problems: tuple[str, ...] = ()
     next_experiment: NextExperiment | None = None
     gain: Gain | None = None
+    robot: RobotTaken | None = None
 
 
 def to_json(verdict: Verdict) -> dict[str, Any]:
@@ -167,6 +195,7 @@ def read_verdict(path: Path) -> Verdict:
         problems=tuple(content["problems"]),
         next_experiment=_next_experiment(content["next_experiment"]),
         gain=_gain(content["gain"]),
+        robot=_robot(content.get("robot")),
     )
 
 
@@ -177,6 +206,14 @@ def _cause(item: dict[str, Any]) -> Cause:
 
 def _next_experiment(item: dict[str, Any] | None) -> NextExperiment | None:
     return None if item is None else NextExperiment(**{**item, "separates": tuple(item["separates"])})
+
+
+def _robot(item: dict[str, Any] | None) -> RobotTaken | None:
+    if item is None:
+        return None
+    given = item["multipliers"]
+    values: dict[str, Any] = {k: Estimate(**v) if isinstance(v, dict) else v for k, v in (given or {}).items()}
+    return RobotTaken(item["kind"], item["assumed"], Multipliers(**values) if values else None)
 
 
 def _gain(item: dict[str, Any] | None) -> Gain | None:
