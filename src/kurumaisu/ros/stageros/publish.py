@@ -74,12 +74,9 @@ class Publisher:
         self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
         self._truth = GroundTruth(interval)
-        self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
-            "odom": self._publish_odometry,
-            "base_pose_ground_truth": self._publish_truth,
-            "collision": self._publish_collisions,
-            "clock": self._publish_clock,  # last: who hears a time has been sent all before it
-        }
+        kinds = ("tf", "odom", "base_pose_ground_truth", "clock")
+        periods = map(self._pace.every, kinds)
+        self._every_transform, self._every_odometry, self._every_truth, self._every_clock = periods
 
     def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
         """Publish these models' robots from now on; those that stay, by their names, keep their topics."""
@@ -104,12 +101,19 @@ class Publisher:
         self._truth.take(observation)
         if self._cameras.wanted:
             self._cameras.publish(poses, number, stamp)
-        if number % self._pace.every("tf") == 0:
-            self._publish_transforms(observation, stamp)
+        odometry = planar(observation.odometry.tolist())
+        if self._transforms and number % self._every_transform == 0:
+            self._transforms.publish(odometry, stamp)
         self._publish_sensors(observation, number, stamp)
-        for kind, publish in self._kinds.items():
-            if number % self._pace.every(kind) == 0:
-                publish(observation, stamp)
+        if number % self._every_odometry == 0:
+            self._publish_odometry(odometry, observation, stamp)
+        if number % self._every_truth == 0:
+            self._publish_truth(stamp)
+        if self._settings.publish_collision and number % self._pace.every("collision") == 0:
+            self._publish_collisions(observation)
+        if number % self._every_clock == 0 and self._clock.wanted:
+            self._clock_wire.stamp(stamp)
+            self._clock.send(self._clock_wire.data)  # last: who hears a time has been sent all before it
 
     def check_rates(self) -> None:
         """Raise Error for a rate of a sensor that there is not."""
@@ -119,37 +123,27 @@ class Publisher:
         said = self._settings.scan_timing
         return Timing(every * self._interval, self._settings.options.scan_sweep) if said else Timing(0.0, 0.0)
 
-    def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
-        if self._transforms:
-            self._transforms.publish(planar(observation.odometry.tolist()), stamp)
-
     def _publish_sensors(self, observation: Observation, number: int, stamp: Stamp) -> None:
+        scans = observation.scans
         for robot in self._robots:
             for index, topic, every in robot.scans:
-                if number % every == 0:
-                    scan = observation.scans[index]
-                    if scan.count:  # as in 1.8.0, nothing before the ranger has looked
-                        topic.publish(scan, stamp)
+                if number % every == 0 and scans.sweep(index).count:  # as in 1.8.0, nothing before the first look
+                    topic.publish(scans, index, stamp)
             for device in robot.devices:
                 device.take(observation.devices)
                 if number % device.every == 0:
                     device.publish(stamp)
 
-    def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
-        poses, velocities = planar(observation.odometry.tolist()), observation.velocities.tolist()
+    def _publish_odometry(self, poses: Sequence[Sequence[float]], observation: Observation, stamp: Stamp) -> None:
+        velocities = observation.velocities.tolist()
         for robot, pose, (v, sideways, w) in zip(self._robots, poses, velocities, strict=True):
             robot.odometry.publish(pose, (v, sideways, 0.0, 0.0, 0.0, w), stamp)
 
-    def _publish_truth(self, _observation: Observation, stamp: Stamp) -> None:
+    def _publish_truth(self, stamp: Stamp) -> None:
         for robot, message in zip(self._robots, self._truth.messages(stamp), strict=True):
             robot.truth.publish(*message)
 
-    def _publish_collisions(self, observation: Observation, _stamp: Stamp) -> None:
+    def _publish_collisions(self, observation: Observation) -> None:
         for robot, stalled in zip(self._robots, observation.stalled.tolist(), strict=True):
             if robot.collision is not None:
                 robot.collision.publish(stalled)
-
-    def _publish_clock(self, _observation: Observation, stamp: Stamp) -> None:
-        if self._clock.wanted:
-            self._clock_wire.stamp(stamp)
-            self._clock.send(self._clock_wire.data)

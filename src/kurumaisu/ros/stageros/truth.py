@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from kurumaisu.ros.wire import Stamp, planar
 from kurumaisu.sim.robots.observation import Observation
@@ -13,8 +13,7 @@ from kurumaisu.sim.robots.observation import Observation
 _NS = 1_000_000_000
 
 
-@dataclass(frozen=True)
-class _Seen:
+class _Seen(NamedTuple):
     """Poses x, y, z, heading of all robots, and by how much [s] the clocks that they are measured by are fast."""
 
     poses: list[list[float]]
@@ -63,8 +62,10 @@ def _seen(observation: Observation) -> _Seen:
 
 def _rates(now: list[float], before: list[float], dt: float) -> tuple[float, ...]:
     """Return the change (6,) from one pose (4,) to another."""
-    x, y, z, turn = (a - b for a, b in zip(now, before, strict=True))
-    return x / dt, y / dt, z / dt, 0.0, 0.0, math.remainder(turn, math.tau) / dt
+    x, y, z, heading = now
+    x0, y0, z0, heading0 = before
+    turn = math.remainder(heading - heading0, math.tau)
+    return (x - x0) / dt, (y - y0) / dt, (z - z0) / dt, 0.0, 0.0, turn / dt
 
 
 def _later(stamp: Stamp, by: float) -> Stamp:
