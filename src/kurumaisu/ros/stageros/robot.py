@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,19 +92,16 @@ class RangeTopic(OutletTopic):
 
 
 class OdometryTopic(OutletTopic):
-    """Poses and rates as nav_msgs/Odometry."""
+    """Poses and rates as nav_msgs/Odometry; the wire is filled by those who fill all robots' at once."""
 
     def __init__(self, topic: str, wire: OdometryWire) -> None:
         super().__init__(topic, Odometry)
-        self._wire = wire
+        self.wire = wire
 
-    def publish(self, pose: Sequence[float], twist: Sequence[float], stamp: Stamp) -> None:
-        """Send a pose (7,) and a twist (6,)."""
-        seq = self._outlet.next_number()
+    def publish(self) -> None:
+        """Send what the wire has."""
         if self._outlet.wanted:
-            self._wire.stamp(seq, stamp)
-            self._wire.fill(pose, twist)
-            self._outlet.send(self._wire.data)
+            self._outlet.send(self.wire.data)
 
 
 class CollisionTopic(OutletTopic):
