@@ -174,4 +174,5 @@ PYBIND11_MODULE(_core, m) {
   k::bindRaycast(m);
   k::bindCamera(m);
   k::bindVirtualUrg(m);
+  k::bindWire(m);
 }

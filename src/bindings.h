@@ -18,5 +18,6 @@ void bindCellRays(pybind11::module_& m);
 void bindCells(pybind11::module_& m);
 void bindCamera(pybind11::module_& m);
 void bindVirtualUrg(pybind11::module_& m);
+void bindWire(pybind11::module_& m);
 
 }  // namespace kurumaisu

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 from sim_worlds import ROOM, drive, robot, simulator
 
 from kurumaisu.effects import Reference
@@ -60,14 +61,13 @@ def test_the_truth_is_as_in_stage_ros(tmp_path):
     truth = GroundTruth(0.1)
     first, second = drive(simulator(tmp_path, ROOM + robot("", "0 0 0 90")), (0.5, 0, 1.0), 2)
     truth.take(first)
-    ((pose, rates, stamp),) = truth.messages((3, 5))
-    assert rates == (0.0,) * 6
-    assert stamp == (3, 5)
+    assert truth.change(3_000_000_005).stamps.tolist() == [3_000_000_005]
+    assert_array_equal(truth.change(0).before, truth.change(0).now)
     truth.take(second)
-    ((pose, rates, _),) = truth.messages((3, 5))
-    assert pose[:2] == pytest.approx(second.poses[0, :2])
-    assert rates[:2] == pytest.approx((second.poses - first.poses)[0, :2] / 0.1)
-    assert rates[5] == pytest.approx(1.0)
+    change = truth.change(0)
+    assert_array_equal(change.before, first.poses)
+    assert_array_equal(change.now, second.poses)
+    assert change.spans.tolist() == [0.1]
 
 
 def test_a_reference_has_its_own_place_and_time(tmp_path):
@@ -75,10 +75,10 @@ def test_a_reference_has_its_own_place_and_time(tmp_path):
     for seen in drive(simulator(tmp_path, robot()), (0.5, 0, 0), 20):
         poses = seen.poses[:, [0, 1, 3]] + [0.0, 0.3, 0.0]
         truth.take(replace(seen, reference=Reference(np.array([1.5 * seen.time]), poses, np.zeros((1, 3)))))
-    ((pose, rates, stamp),) = truth.messages((7, 0))
-    assert pose[:2] == pytest.approx((1.0, 0.3))
-    assert rates[0] == pytest.approx(0.5 / 1.5)
-    assert stamp == (8, 0)  # a second fast after two
+    change = truth.change(7_000_000_000)
+    assert change.now[0, :2] == pytest.approx((1.0, 0.3))
+    assert change.spans == pytest.approx([0.15])
+    assert change.stamps.tolist() == [8_000_000_000]  # a second fast after two
 
 
 def test_names_are_saved():

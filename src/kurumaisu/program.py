@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import signal
 import sys
@@ -56,6 +57,17 @@ def no_arguments(name: str, text: str) -> None:
     node_parser(name, text).parse_args(words())
 
 
-def die_of_ctrl_c() -> None:
-    """Let Ctrl-C end the program while the modules of a node load: a KeyboardInterrupt may get lost in an import."""
+def load_a_node() -> None:
+    """Prepare to load the modules of a node.
+
+    Ctrl-C ends the program meanwhile: a KeyboardInterrupt may get lost in an import. No garbage is looked for, which
+    there is hardly any of, until `loaded` is called.
+    """
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    gc.disable()
+
+
+def loaded() -> None:
+    """Look for garbage from now on, but not among what has been loaded."""
+    gc.freeze()
+    gc.enable()

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Array types shared by all modules."""
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
-ByteArray = NDArray[np.uint8]
+import numpy as np
+
+# What numpy.typing.NDArray stands for, which takes long to load.
+FloatArray = np.ndarray[Any, np.dtype[np.float64]]
+IntArray = np.ndarray[Any, np.dtype[np.int64]]
+BoolArray = np.ndarray[Any, np.dtype[np.bool_]]
+ByteArray = np.ndarray[Any, np.dtype[np.uint8]]

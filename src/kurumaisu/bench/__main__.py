@@ -46,6 +46,7 @@ MODULES = {
     "paper_scans": "kurumaisu.bench.paper.scans",
     "paper_wall": "kurumaisu.bench.paper.wall",
     "viewer": "kurumaisu.bench.speed.viewer.main",
+    "nodes": "kurumaisu.bench.speed.nodes",
     "wheel": "kurumaisu.bench.wheel",
 }
 _HELP = "\n  --write PAGE          put command and tables into the section of this benchmark in a page of docs/"

@@ -29,7 +29,7 @@ def main(words: Sequence[str] | None = None) -> int:
     words = sys.argv[1:] if words is None else words
     name = words[0] if words else ""
     if name in _NODES:
-        program.die_of_ctrl_c()
+        program.load_a_node()
     if name in _PARTS:
         return _told(name, words[1:])
     from kurumaisu.critic.app import options

@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import rospy
 
+from kurumaisu import program
 from kurumaisu.errors import Error, failed, one_line
 from kurumaisu.ros import master
 
@@ -110,6 +111,7 @@ def run(name: str, node: Callable[[Life], int], *, anonymous: bool = False, rost
 
     node: waits for life.asked where it waits. rostime: it hears /clock.
     """
+    program.loaded()
     life = Life()
     try:
         return node(life) if life.begin(name, anonymous=anonymous, rostime=rostime) else life.code

@@ -5,11 +5,10 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from geometry_msgs.msg import Transform, TransformStamped, Vector3
-from numpy.typing import NDArray
 from rospy import Time
 from sensor_msgs.msg import BatteryState, CameraInfo, Image, Imu, Range
 from std_msgs.msg import Header
@@ -24,6 +23,9 @@ from kurumaisu.sim.sensors.imu import ImuReading
 from kurumaisu.sim.sensors.sonar import SonarSettings
 from kurumaisu.types import BoolArray, FloatArray
 from kurumaisu.world.model import Camera
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _UNKNOWN = -1.0  # REP-145: the first covariance of what is not measured
 

@@ -9,7 +9,6 @@ bytes follow.
 from __future__ import annotations
 
 import io
-import math
 import struct
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -22,14 +21,14 @@ from sensor_msgs.msg import CameraInfo, Image, LaserScan, Range
 from std_msgs.msg import Bool
 from tf2_msgs.msg import TFMessage
 
+from kurumaisu._core import OdometryFields, TransformFields
+
 Stamp = tuple[int, int]  # whole seconds and nanoseconds
 
 _LENGTH = struct.Struct("<I")
 _STAMP = struct.Struct("<2I")
 _HEAD = struct.Struct("<3I")  # seq and stamp, with which every header starts
-_TRANSFORM = struct.Struct("<7d")  # also of a pose: x, y, z, quaternion x, y, z, w
-_POSE = struct.Struct("<7d")
-_TWIST = struct.Struct("<6d")
+_TRANSFORM = struct.Struct("<7d")  # as a pose: x, y, z, quaternion x, y, z, w
 _FLOAT = struct.Struct("<f")
 _DOUBLE = 8  # bytes
 _COVARIANCE = 36 * _DOUBLE
@@ -64,13 +63,14 @@ class OdometryWire(Wire):
         message.pose.covariance = np.diag(np.asarray(pose, float)).ravel().tolist()
         message.twist.covariance = np.diag(np.asarray(twist, float)).ravel().tolist()
         super().__init__(message)
-        self._pose = self._body + _text(child)
-        self._twist = self._pose + _POSE.size + _COVARIANCE
+        self.pose = self._body + _text(child)  # where it begins
+        self.twist = self.pose + _TRANSFORM.size + _COVARIANCE
+        self.stamp(-1, (0, 0))  # the first that is sent has number 0
 
-    def fill(self, pose: Sequence[float], twist: Sequence[float]) -> None:
-        """Set the pose (7,): x, y, z, quaternion, and the twist (6,)."""
-        _POSE.pack_into(self.data, self._pose, *pose)
-        _TWIST.pack_into(self.data, self._twist, *twist)
+
+def odometry_fields(wires: Sequence[OdometryWire]) -> OdometryFields:
+    """Return what fills several messages at once."""
+    return OdometryFields([w.data for w in wires], [w.pose for w in wires], [w.twist for w in wires])
 
 
 class LaserScanWire(Wire):
@@ -140,6 +140,11 @@ class TransformsWire:
         for start in self._starts:
             pack(data, start + _LENGTH.size, *stamp)
 
+    def fields(self, planar: Sequence[int]) -> TransformFields:
+        """Return what fills all stamps and these transforms, which are poses in the plane."""
+        stamps = [start + _LENGTH.size for start in self._starts]
+        return TransformFields(self.data, stamps, [self._ends[index] - _TRANSFORM.size for index in planar])
+
     def fill(self, index: int, transform: Sequence[float]) -> None:
         """Set a transform (7,): x, y, z, quaternion."""
         _TRANSFORM.pack_into(self.data, self._ends[index] - _TRANSFORM.size, *transform)
@@ -165,12 +170,6 @@ class BoolWire:
     def fill(self, value: bool) -> None:
         """Set the value."""
         self.data[-1] = value
-
-
-def planar(poses: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
-    """Return poses of x, y [m], heading [rad] as x, y, z = 0, quaternion (7,)."""
-    # numpy's calls cost more than this for up to a dozen robots, and the sockets more than either for more
-    return [(x, y, 0.0, 0.0, 0.0, math.sin(heading / 2), math.cos(heading / 2)) for x, y, heading in poses]
 
 
 def _text(text: str) -> int:

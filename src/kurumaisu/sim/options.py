@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from kurumaisu import effects, settings
+from kurumaisu import settings
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, effects_of
 
@@ -116,6 +116,8 @@ def _devices(section: settings.Section) -> tuple[str, ...]:
 
 
 def _robot_effects(section: settings.Section) -> RobotEffects:
+    from kurumaisu import effects  # most have none, and need not pay for the catalogue
+
     entry = RobotEffects(section.text("robot"), effects_of(section))
     section.end()
     try:

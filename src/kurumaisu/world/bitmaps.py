@@ -7,18 +7,20 @@ import math
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
 
 from kurumaisu.bounded_files import MOST_IMAGE, MOST_TEXT, check_file, read_text
 from kurumaisu.errors import Error, one_line, told
 from kurumaisu.settings import parsed
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-Pixels = NDArray[Any]  # (height, width), row 0 at the top, of whatever type the image has
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from PIL import Image
+
+Pixels = np.ndarray[Any, np.dtype[Any]]  # (height, width), row 0 at the top, of whatever type the image has
 
 _MOST_PIXELS = 10**8  # of an image: 100 MB
 _MOST_RUNS = 5_000_000  # of an outline: 160 MB; a map of a building has some thousand
@@ -98,6 +100,8 @@ def _bitmap(path: Path, occupied: BoolArray) -> Bitmap:
 
 def _pixels(path: Path, every_channel: bool) -> Pixels:
     """Return the first channel, or the mean of the colours, of all pixels (height, width), row 0 at the top."""
+    from PIL import Image  # worlds without bitmaps need not pay for it
+
     check_file(path, MOST_IMAGE)
     try:
         with warnings.catch_warnings():

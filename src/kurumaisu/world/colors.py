@@ -7,8 +7,6 @@ import colorsys
 import re
 from collections.abc import Iterable
 
-from PIL import ImageColor
-
 from kurumaisu.world.values import Values
 
 Color = tuple[float, float, float, float]  # red, green, blue, alpha in [0, 1]
@@ -49,6 +47,8 @@ def named(name: str) -> tuple[float, float, float] | None:
         return (shade, shade, shade) if shade <= 1 else None
     if name in _NAMES:
         return _scaled(bytes.fromhex(_NAMES[name]), 1.0)
+    from PIL import ImageColor  # worlds of grey walls need not pay for it
+
     if name in ImageColor.colormap:
         return _scaled(ImageColor.getrgb(name)[:3], 1.0)
     brightest = named(name[:-1] + "1" * (name[-1] != "1")) if name[-1:] in _SHADES else None

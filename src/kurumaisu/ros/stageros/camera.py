@@ -4,10 +4,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo, Image
 
 from kurumaisu.ros.outlet import DEPTH, Outlet
@@ -27,6 +26,9 @@ from kurumaisu.sim.sensors.camera import (
 )
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Model
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 
 class Cameras:
@@ -61,7 +63,7 @@ class Cameras:
     @property
     def wanted(self) -> bool:
         """Whether anybody looks."""
-        return any(topics.wanted for topics in self._topics)
+        return bool(self._topics) and any(topics.wanted for topics in self._topics)
 
     def publish(self, poses: Callable[[], FloatArray], number: int, stamp: Stamp) -> None:
         """Take and send what is looked at and due in a step, the number-th; poses: tells those (m, 4) of all models."""

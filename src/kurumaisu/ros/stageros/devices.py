@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import rospy
@@ -17,8 +17,10 @@ from kurumaisu.ros.outlet import OutletTopic
 from kurumaisu.ros.rotation import quaternion_of
 from kurumaisu.ros.stageros.plan import DevicePlan
 from kurumaisu.ros.wire import Stamp, packed
-from kurumaisu.sim.robots.devices import Value
 from kurumaisu.sim.sensors.fiducial import Sightings
+
+if TYPE_CHECKING:
+    from kurumaisu.sim.robots.devices import Value
 
 
 class DeviceTopic(OutletTopic):

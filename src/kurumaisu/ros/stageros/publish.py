@@ -16,11 +16,12 @@ from kurumaisu.ros.stageros.rates import Pace
 from kurumaisu.ros.stageros.robot import CommandListener, RobotTopics, Timing, transform_of
 from kurumaisu.ros.stageros.settings import StagerosSettings
 from kurumaisu.ros.stageros.truth import GroundTruth
-from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, planar
+from kurumaisu.ros.wire import ClockWire, Stamp, TransformsWire, odometry_fields
 from kurumaisu.sim.robots.observation import Observation
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Model
 
+_NS = 1_000_000_000
 _TF_DEPTH = 100  # as of tf2_ros
 
 
@@ -30,14 +31,14 @@ class TransformTopic:
     def __init__(self, settings: StagerosSettings) -> None:
         self.outlet = Outlet("/tf", TFMessage, _TF_DEPTH)
         self._frames = settings.frames
-        self._odom: list[int] = []
         self._wire = TransformsWire([])
+        self._fields = self._wire.fields([])
 
     def change(self, plans: Sequence[RobotPlan]) -> None:
         """Take other robots from now on."""
         pairs: list[tuple[str, str]] = []
         mounts: list[tuple[int, list[float]]] = []
-        self._odom = []
+        odometry: list[int] = []
         frames = self._frames
         for plan in plans:
             odom, foot, base = map(plan.names.frame, (frames.odom, frames.base_footprint, frames.base_link))
@@ -45,18 +46,17 @@ class TransformTopic:
                 mounts.append((len(pairs), transform_of(scan.mount)))
                 pairs.append((base, scan.frame))
             pairs.append((foot, base))
-            self._odom.append(len(pairs))
+            odometry.append(len(pairs))
             pairs.append((odom, foot))
         self._wire = TransformsWire(pairs)
         for index, mount in mounts:
             self._wire.fill(index, mount)
+        self._fields = self._wire.fields(odometry)
 
-    def publish(self, odometry: Sequence[Sequence[float]], stamp: Stamp) -> None:
-        """Send the transforms with each robot's odometry (7,)."""
-        if self.outlet.wanted and self._odom:
-            self._wire.stamp(stamp)
-            for index, pose in zip(self._odom, odometry, strict=True):
-                self._wire.fill(index, pose)
+    def publish(self, odometry: FloatArray, now: int) -> None:
+        """Send the transforms with the robots' odometry (n, 3) at a time [ns]."""
+        if self.outlet.wanted and len(odometry):
+            self._fields.fill(now, odometry)
             self.outlet.send(self._wire.data)
 
 
@@ -69,17 +69,15 @@ class Publisher:
         self._pace = Pace(settings.rates, interval)
         self._interval = interval
         self._ears = ears
+        self._odometry = self._truths = odometry_fields([])
         self._transforms = TransformTopic(settings) if settings.publish_tf else None
         self._cameras = Cameras(settings, self._pace, self._transforms.outlet if self._transforms else None)
         self._robots: list[RobotTopics] = []
         self._clock, self._clock_wire = Outlet("/clock", Clock, DEPTH), ClockWire()
         self._truth = GroundTruth(interval)
-        self._kinds: dict[str, Callable[[Observation, Stamp], None]] = {
-            "odom": self._publish_odometry,
-            "base_pose_ground_truth": self._publish_truth,
-            "collision": self._publish_collisions,
-            "clock": self._publish_clock,  # last: who hears a time has been sent all before it
-        }
+        kinds = ("tf", "odom", "base_pose_ground_truth", "clock")
+        periods = map(self._pace.every, kinds)
+        self._every_transform, self._every_odometry, self._every_truth, self._every_clock = periods
 
     def change(self, models: Sequence[Model], plans: Sequence[RobotPlan]) -> None:
         """Publish these models' robots from now on; those that stay, by their names, keep their topics."""
@@ -94,6 +92,8 @@ class Publisher:
                 robot = RobotTopics(plan, self._settings, self._pace, self._timing, self._ears(plan.names))
             robot.plan = plan
             self._robots.append(robot)
+        self._odometry = odometry_fields([robot.odometry.wire for robot in self._robots])
+        self._truths = odometry_fields([robot.truth.wire for robot in self._robots])
         if self._transforms:
             self._transforms.change(plans)
         self._cameras.change(models, plans)
@@ -104,12 +104,23 @@ class Publisher:
         self._truth.take(observation)
         if self._cameras.wanted:
             self._cameras.publish(poses, number, stamp)
-        if number % self._pace.every("tf") == 0:
-            self._publish_transforms(observation, stamp)
+        now = stamp[0] * _NS + stamp[1]
+        if self._transforms and number % self._every_transform == 0:
+            self._transforms.publish(observation.odometry, now)
         self._publish_sensors(observation, number, stamp)
-        for kind, publish in self._kinds.items():
-            if number % self._pace.every(kind) == 0:
-                publish(observation, stamp)
+        if number % self._every_odometry == 0:
+            self._odometry.fill(now, observation.odometry, observation.velocities)
+            for robot in self._robots:
+                robot.odometry.publish()
+        if number % self._every_truth == 0:
+            self._truths.fill_change(*self._truth.change(now))
+            for robot in self._robots:
+                robot.truth.publish()
+        if self._settings.publish_collision and number % self._pace.every("collision") == 0:
+            self._publish_collisions(observation)
+        if number % self._every_clock == 0 and self._clock.wanted:
+            self._clock_wire.stamp(stamp)
+            self._clock.send(self._clock_wire.data)  # last: who hears a time has been sent all before it
 
     def check_rates(self) -> None:
         """Raise Error for a rate of a sensor that there is not."""
@@ -119,37 +130,18 @@ class Publisher:
         said = self._settings.scan_timing
         return Timing(every * self._interval, self._settings.options.scan_sweep) if said else Timing(0.0, 0.0)
 
-    def _publish_transforms(self, observation: Observation, stamp: Stamp) -> None:
-        if self._transforms:
-            self._transforms.publish(planar(observation.odometry.tolist()), stamp)
-
     def _publish_sensors(self, observation: Observation, number: int, stamp: Stamp) -> None:
+        scans = observation.scans
         for robot in self._robots:
             for index, topic, every in robot.scans:
-                if number % every == 0:
-                    scan = observation.scans[index]
-                    if scan.count:  # as in 1.8.0, nothing before the ranger has looked
-                        topic.publish(scan, stamp)
+                if number % every == 0 and scans.sweep(index).count:  # as in 1.8.0, nothing before the first look
+                    topic.publish(scans, index, stamp)
             for device in robot.devices:
                 device.take(observation.devices)
                 if number % device.every == 0:
                     device.publish(stamp)
 
-    def _publish_odometry(self, observation: Observation, stamp: Stamp) -> None:
-        poses, velocities = planar(observation.odometry.tolist()), observation.velocities.tolist()
-        for robot, pose, (v, sideways, w) in zip(self._robots, poses, velocities, strict=True):
-            robot.odometry.publish(pose, (v, sideways, 0.0, 0.0, 0.0, w), stamp)
-
-    def _publish_truth(self, _observation: Observation, stamp: Stamp) -> None:
-        for robot, message in zip(self._robots, self._truth.messages(stamp), strict=True):
-            robot.truth.publish(*message)
-
-    def _publish_collisions(self, observation: Observation, _stamp: Stamp) -> None:
+    def _publish_collisions(self, observation: Observation) -> None:
         for robot, stalled in zip(self._robots, observation.stalled.tolist(), strict=True):
             if robot.collision is not None:
                 robot.collision.publish(stalled)
-
-    def _publish_clock(self, _observation: Observation, stamp: Stamp) -> None:
-        if self._clock.wanted:
-            self._clock_wire.stamp(stamp)
-            self._clock.send(self._clock_wire.data)

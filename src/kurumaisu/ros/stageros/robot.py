@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from kurumaisu.ros.stageros.plan import RobotPlan, ScanPlan
 from kurumaisu.ros.stageros.rates import Pace
 from kurumaisu.ros.stageros.settings import StagerosSettings
 from kurumaisu.ros.wire import BoolWire, LaserScanWire, OdometryWire, RangeWire, Stamp
-from kurumaisu.sim.rangers.scans import Scan
+from kurumaisu.sim.rangers.scans import Scans, Sweep
 from kurumaisu.types import FloatArray
 from kurumaisu.world.model import Fan
 
@@ -50,14 +50,17 @@ class ScanTopic(OutletTopic):
         self._wire = LaserScanWire(_fan_message(plan, fan, timing), fan.samples)
         self._miss = fan.range_max
         self._is_noisy = bool(fan.noise.any())
+        self._written: Sweep | None = None
 
-    def publish(self, reading: Scan, stamp: Stamp) -> None:
-        """Send a reading."""
+    def publish(self, scans: Scans, index: int, stamp: Stamp) -> None:
+        """Send a fan's newest reading, which may be the one before: most worlds step more often than they look."""
         seq = self._outlet.next_number()
         if self._outlet.wanted:
             self._wire.stamp(seq, stamp)
-            self._write(reading.ranges)
-            self._wire.intensities[:] = reading.returns
+            if (sweep := scans.sweep(index)) is not self._written:
+                reading, self._written = scans[index], sweep
+                self._write(reading.ranges)
+                self._wire.intensities[:] = reading.returns
             self._outlet.send(self._wire.data)
 
     def _write(self, ranges: FloatArray) -> None:
@@ -79,29 +82,26 @@ class RangeTopic(OutletTopic):
         self._wire = RangeWire(message)
         self._miss = fan.range_max
 
-    def publish(self, reading: Scan, stamp: Stamp) -> None:
-        """Send a reading."""
+    def publish(self, scans: Scans, index: int, stamp: Stamp) -> None:
+        """Send a fan's newest reading."""
         seq = self._outlet.next_number()
         if self._outlet.wanted:
             self._wire.stamp(seq, stamp)
-            self._wire.fill(min(float(reading.ranges[0]), self._miss))
+            self._wire.fill(min(float(scans[index].ranges[0]), self._miss))
             self._outlet.send(self._wire.data)
 
 
 class OdometryTopic(OutletTopic):
-    """Poses and rates as nav_msgs/Odometry."""
+    """Poses and rates as nav_msgs/Odometry; the wire is filled by those who fill all robots' at once."""
 
     def __init__(self, topic: str, wire: OdometryWire) -> None:
         super().__init__(topic, Odometry)
-        self._wire = wire
+        self.wire = wire
 
-    def publish(self, pose: Sequence[float], twist: Sequence[float], stamp: Stamp) -> None:
-        """Send a pose (7,) and a twist (6,)."""
-        seq = self._outlet.next_number()
+    def publish(self) -> None:
+        """Send what the wire has."""
         if self._outlet.wanted:
-            self._wire.stamp(seq, stamp)
-            self._wire.fill(pose, twist)
-            self._outlet.send(self._wire.data)
+            self._outlet.send(self.wire.data)
 
 
 class CollisionTopic(OutletTopic):

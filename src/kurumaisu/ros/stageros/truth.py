@@ -3,22 +3,34 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
-from kurumaisu.ros.wire import Stamp, planar
+import numpy as np
+
+from kurumaisu.geometry import PLANAR
 from kurumaisu.sim.robots.observation import Observation
+from kurumaisu.types import FloatArray, IntArray
 
 _NS = 1_000_000_000
 
 
-@dataclass(frozen=True)
-class _Seen:
-    """Poses x, y, z, heading of all robots, and by how much [s] the clocks that they are measured by are fast."""
+class Change(NamedTuple):
+    """Stamps (n,) [ns], which hold until the next step; poses now and before (n, 4): x, y, z [m], heading [rad].
 
-    poses: list[list[float]]
-    fast: list[float]
+    spans (n,) [s]: between them.
+    """
+
+    stamps: IntArray
+    now: FloatArray
+    before: FloatArray
+    spans: FloatArray
+
+
+class _Seen(NamedTuple):
+    """Poses (n, 4) of all robots; by how much (n,) [s] the clocks that they are measured by are fast; None: not."""
+
+    poses: FloatArray
+    fast: FloatArray | None
 
 
 class GroundTruth:
@@ -27,6 +39,7 @@ class GroundTruth:
     def __init__(self, interval: float) -> None:
         """Note the length of the steps [s]."""
         self._interval = interval
+        self._stamps, self._spans = np.zeros(0, dtype=np.int64), np.zeros(0)
         self.forget()
 
     def forget(self) -> None:
@@ -39,35 +52,26 @@ class GroundTruth:
         seen = _seen(observation)
         self._before, self._now = self._now or seen, seen
 
-    def messages(self, stamp: Stamp) -> Iterator[tuple[tuple[float, ...], tuple[float, ...], Stamp]]:
-        """Give pose (7,), twist (6,) and stamp of each robot."""
+    def change(self, stamp: int) -> Change:
+        """Return the change of the newest step, which has a stamp [ns]."""
         now, before = self._now, self._before
         assert now is not None
         assert before is not None
-        poses = planar([(x, y, heading) for x, y, _, heading in now.poses])
-        for i, pose in enumerate(poses):
-            dt = self._interval + now.fast[i] - before.fast[i]
-            yield pose, _rates(now.poses[i], before.poses[i], dt), _later(stamp, now.fast[i])
+        stamps, spans = self._stamps, self._spans  # made once
+        if len(stamps) != len(now.poses):
+            stamps = self._stamps = np.zeros(len(now.poses), dtype=np.int64)
+            spans = self._spans = np.full(len(now.poses), self._interval)
+        if now.fast is None or before.fast is None:
+            stamps.fill(stamp)
+            return Change(stamps, now.poses, before.poses, spans)
+        stamps = np.maximum(stamp + np.rint(now.fast * _NS).astype(np.int64), 0)
+        return Change(stamps, now.poses, before.poses, spans + now.fast - before.fast)
 
 
 def _seen(observation: Observation) -> _Seen:
-    poses: list[list[float]] = observation.poses.tolist()
-    reference = observation.reference
+    poses, reference = observation.poses, observation.reference
     if reference is None:
-        return _Seen(poses, [0.0] * len(poses))
-    measured = [
-        [x, y, z, heading] for (x, y, heading), (_, _, z, _) in zip(reference.poses.tolist(), poses, strict=True)
-    ]
-    return _Seen(measured, (reference.times - observation.time).tolist())
-
-
-def _rates(now: list[float], before: list[float], dt: float) -> tuple[float, ...]:
-    """Return the change (6,) from one pose (4,) to another."""
-    x, y, z, turn = (a - b for a, b in zip(now, before, strict=True))
-    return x / dt, y / dt, z / dt, 0.0, 0.0, math.remainder(turn, math.tau) / dt
-
-
-def _later(stamp: Stamp, by: float) -> Stamp:
-    if by == 0:
-        return stamp
-    return divmod(max(stamp[0] * _NS + stamp[1] + round(by * _NS), 0), _NS)
+        return _Seen(poses, None)
+    measured = poses.copy()
+    measured[:, PLANAR] = reference.poses
+    return _Seen(measured, reference.times - observation.time)

@@ -33,7 +33,7 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def _record(options: argparse.Namespace) -> int:
-    program.die_of_ctrl_c()
+    program.load_a_node()
     from kurumaisu.ros.tools.calibrate_record import record
 
     return record(options.bag, load_options(options.settings), options.every, options.split)

@@ -29,6 +29,7 @@ _PATIENCE = 14.0  # [s] for the other nodes to end, in which roslaunch does not 
 def main() -> int:
     """Watch the master until told to end."""
     program.no_arguments("launch_watch", _HELP)
+    program.loaded()
     launch, run, ends = os.getppid(), _run(), {signal.SIGINT, signal.SIGTERM}
     signal.pthread_sigmask(signal.SIG_BLOCK, ends)
     while signal.sigtimedwait(ends, _PERIOD) is None:

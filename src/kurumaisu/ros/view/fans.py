@@ -5,19 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from kurumaisu.geometry import PLANAR, attached
 from kurumaisu.params import Laser
-from kurumaisu.sim.chair.scanner import Scan
-from kurumaisu.sim.chair.simulator import Observation as ChairObservation
 from kurumaisu.sim.rangers.fans import spread
 from kurumaisu.sim.rangers.scans import Scans
 from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.simulator import Simulator
 from kurumaisu.types import FloatArray, IntArray
+
+if TYPE_CHECKING:  # it loads pymunk, which worlds of Stage need not pay for
+    from kurumaisu.sim.chair.scanner import Scan
+    from kurumaisu.sim.chair.simulator import Observation as ChairObservation
 
 _NS = 1_000_000_000
 

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kurumaisu.ros.view.fans import Looks
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 _NS = 1_000_000_000
 _WORD = "<u4"  # of the lengths in front of what varies

@@ -62,16 +62,14 @@ class StageMotion:
 
     def move(self, velocities: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
         """Move each body whose velocity is not zero, in order, those that carry others first; see Motion."""
-        moving = velocities.any(axis=1)
         self._collisions.begin_step()
-        if np.count_nonzero(moving):  # faster than any()
+        all_drive = self._apart and np.count_nonzero(velocities[:, 0]) == len(velocities)  # as in most steps
+        if all_drive or np.count_nonzero(velocities):  # faster than any()
             self._new = step(self._poses, velocities, dt)
-            if not self._apart:
-                for body in np.flatnonzero(moving & self._carries):
-                    self._settle_stack(int(body))
-                    self._new = step(self._poses, velocities, dt)  # of those that were carried
-                moving &= ~self._carries
-            self._settle(slice(None) if np.count_nonzero(moving) == len(moving) else np.flatnonzero(moving))
+            if all_drive:
+                self._settle(slice(None))
+            else:
+                self._settle_some(velocities, dt)
             self._collisions.end_step(self._poses)
         return self._poses, self._stalled
 
@@ -85,11 +83,23 @@ class StageMotion:
         self._stalled[:] = state["stalled"]
         self._collisions.restore(state)
 
+    def _settle_some(self, velocities: FloatArray, dt: float) -> None:
+        """Let those bodies take their steps whose velocity is not zero."""
+        moving = velocities.any(axis=1)
+        if not self._apart:
+            for body in np.flatnonzero(moving & self._carries):
+                self._settle_stack(int(body))
+                self._new = step(self._poses, velocities, dt)  # of those that were carried
+            moving &= ~self._carries
+        self._settle(slice(None) if np.count_nonzero(moving) == len(moving) else np.flatnonzero(moving))
+
     def _settle(self, which: slice | IntArray) -> None:
         """Let bodies take their steps, each on its own."""
         stalled = self._collisions.move(which, self._new[which])
         self._stalled[which] = stalled
-        if isinstance(which, slice):
+        if isinstance(which, slice) and not np.count_nonzero(stalled):
+            self._poses[:] = self._new
+        elif isinstance(which, slice):
             np.copyto(self._poses, self._new, where=~stalled[:, np.newaxis])
         else:
             free = which[~stalled]

@@ -5,17 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kurumaisu._core import mounted
 from kurumaisu.geometry import attached
-from kurumaisu.sim.rangers.fan_effects import FanEffects
 from kurumaisu.sim.rangers.fans import RangerFan, moments, spread
 from kurumaisu.sim.rangers.ray_casters import RayCaster
 from kurumaisu.sim.rangers.scans import Scans, Sweep
 from kurumaisu.sim.sensors.ranger_noise import RangerNoise
 from kurumaisu.types import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from kurumaisu.sim.rangers.fan_effects import FanEffects
 
 _TURN = 2 * np.pi
 _BLIND = 1e-6  # range_max [m] of fans that the effects look with
@@ -74,6 +77,11 @@ class Rangers:
         """Measure with those due in a step, counted from 1, on the way between frames (b + 1, 4)."""
         self._eyes.follow(way[1])
         self._note(time, *way)
+        for cohort in self._cohorts:
+            if step % cohort.every == cohort.phase:
+                break
+        else:
+            return
         old = self._scans.sweeps
         new = tuple(
             c.measure(time, o.count + 1, *way, rng) if step % c.every == c.phase else o

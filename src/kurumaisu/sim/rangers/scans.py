@@ -60,6 +60,10 @@ class Scans(Sequence[Scan]):
         sweep = self.sweeps[which]
         return Scan(sweep.ranges[start:stop], sweep.returns[start:stop], sweep.time, sweep.count)
 
+    def sweep(self, index: int) -> Sweep:
+        """Return the sweep that a fan's scan is part of; another object when there is a newer one."""
+        return self.sweeps[self._places[index][0]]
+
     def __iter__(self) -> Iterator[Scan]:
         return (self[i] for i in range(len(self)))
 

@@ -5,23 +5,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kurumaisu import effects
 from kurumaisu._core import Arena, AxisLaw
-from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 from kurumaisu.params import EffectSetting, identity_law
 from kurumaisu.sim.memory import recall, remember
 from kurumaisu.sim.options import ALL_ROBOTS, Options, RobotEffects
-from kurumaisu.sim.plant import Plant
-from kurumaisu.sim.rangers.fan_effects import FanEffects
 from kurumaisu.sim.rangers.fans import RangerFan
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world.model import Model
+
+if TYPE_CHECKING:  # loaded below by those that have any
+    from kurumaisu.effects import Reference
+    from kurumaisu.sim.plant import Plant
+    from kurumaisu.sim.rangers.fan_effects import FanEffects
 
 _STREAM = 3  # of a seed's; those before it are the simulator's own
 
@@ -52,23 +53,33 @@ class FleetEffects:
     def begin(self, seed: int) -> None:
         """Start the robots' effects anew."""
         self._seed = seed
-        law = identity_law()
-        self._plants = {
-            row: Plant(_Follower(chosen, law, law), self._step, self._stream(row, 0))
-            for row, chosen in enumerate(self._chosen)
-            if _any_of(effects.BaseEffect, chosen)
-        }
+        self._plants = {}
+        if any(self._chosen):
+            from kurumaisu.effects import BaseEffect
+            from kurumaisu.sim.plant import Plant
+
+            law = identity_law()
+            self._plants = {
+                row: Plant(_Follower(chosen, law, law), self._step, self._stream(row, 0))
+                for row, chosen in enumerate(self._chosen)
+                if _any_of(BaseEffect, chosen)
+            }
         self.referred = any(plant.effects.reference for plant in self._plants.values())
 
     def begin_fans(self, fans: Sequence[RangerFan], keys: IntArray, arena: Arena) -> dict[int, FanEffects]:
         """Start the fans' effects anew and return them; keys (models,): what the models are known by for life."""
         self._fans, self._fan_keys = {}, {}
+        if not any(self._chosen):
+            return self._fans
+        from kurumaisu.effects import LaserEffect, build_laser
+        from kurumaisu.sim.rangers.fan_effects import FanEffects
+
         for place, fan in enumerate(fans):
-            if fan.robot < 0 or not _any_of(effects.LaserEffect, self._chosen[fan.robot]):
+            if fan.robot < 0 or not _any_of(LaserEffect, self._chosen[fan.robot]):
                 continue
             key = int(keys[fan.model.index])
             rng = self._stream(fan.robot, 1 + key, fan.number)
-            chain = effects.build_laser(self._chosen[fan.robot], rng)
+            chain = build_laser(self._chosen[fan.robot], rng)
             self._fans[place] = FanEffects(fan, chain, rng, arena, self._step, self._sweep)
             self._fan_keys[place] = f"{key}.{fan.number}"
         return self._fans
@@ -94,6 +105,8 @@ class FleetEffects:
 
     def seen(self, time: float, poses: FloatArray, rates: FloatArray) -> Reference:
         """Return what a reference measures of robots at poses, with rates (n, 3)."""
+        from kurumaisu.effects import Reference
+
         times, poses, rates = np.full(len(poses), time), poses.copy(), rates.copy()
         for row, plant in self._plants.items():
             one = plant.seen(Reference(np.array(time), poses[row], rates[row]))
@@ -127,8 +140,11 @@ def check_names(entries: Sequence[RobotEffects], robots: Sequence[Model]) -> Non
         if entry.robot != ALL_ROBOTS and entry.robot not in names:
             near = hint(entry.robot, names)
             raise Error(f"effects: robot: the world has no position of this name: {entry.robot}; {near}")
-    for robot in robots:
-        effects.check(_of(robot, entries))
+    if entries:
+        from kurumaisu.effects import check
+
+        for robot in robots:
+            check(_of(robot, entries))
 
 
 def _of(robot: Model, entries: Sequence[RobotEffects]) -> tuple[EffectSetting, ...]:
@@ -136,4 +152,6 @@ def _of(robot: Model, entries: Sequence[RobotEffects]) -> tuple[EffectSetting, .
 
 
 def _any_of(kind: type[Any], chosen: Sequence[EffectSetting]) -> bool:
-    return any(issubclass(effects.by_id(effect.id), kind) for effect in chosen)
+    from kurumaisu.effects import by_id
+
+    return any(issubclass(by_id(effect.id), kind) for effect in chosen)

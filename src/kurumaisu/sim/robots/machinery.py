@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from kurumaisu.effects import Reference
 from kurumaisu.errors import Error
 from kurumaisu.geometry import PLANAR, attached, between, relative, wrap
 from kurumaisu.sim.motion.cells import build_cell_rays, build_cells
@@ -31,6 +30,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world.model import Model, Position
 
 if TYPE_CHECKING:
+    from kurumaisu.effects import Reference
     from kurumaisu.sim.motion.following import Followed
 
 

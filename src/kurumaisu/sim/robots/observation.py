@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from kurumaisu.effects import Reference
 from kurumaisu.sim.rangers.scans import Scans
-from kurumaisu.sim.robots.devices import Value
-from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.types import BoolArray, FloatArray
+
+if TYPE_CHECKING:
+    from kurumaisu.effects import Reference
+    from kurumaisu.sim.robots.devices import Value
+    from kurumaisu.sim.sensors.suite import Reading
 
 
 @dataclass(frozen=True)

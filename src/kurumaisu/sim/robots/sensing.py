@@ -4,16 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kurumaisu.sim.robots.devices import Value, WorldDevices
 from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.solids import Solids
-from kurumaisu.sim.sensors.bumper import BumperSettings
-from kurumaisu.sim.sensors.settings import SensorSettings
-from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
+
+if TYPE_CHECKING:  # loaded below by those that have any
+    from kurumaisu.sim.robots.devices import Value, WorldDevices
+    from kurumaisu.sim.sensors.settings import SensorSettings
+    from kurumaisu.sim.sensors.suite import Moment, Reading, SensorSuite
 
 
 class Sensing:
@@ -24,11 +25,20 @@ class Sensing:
     ) -> None:
         """Power up the sensors at a time [s]. Raise Error for a robot that the world has not."""
         self._machinery = machinery
-        felt = any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors)
-        self._solids = Solids(machinery) if felt else None
-        self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng) if sensors else None
-        types = machinery.options.devices
-        self._devices = WorldDevices(machinery, types) if types else None
+        self._solids: Solids | None = None
+        self._suite: SensorSuite | None = None
+        if sensors:
+            from kurumaisu.sim.sensors.bumper import BumperSettings
+            from kurumaisu.sim.sensors.suite import SensorSuite
+
+            if any(isinstance(sensor.parameters, BumperSettings) for sensor in sensors):
+                self._solids = Solids(machinery)
+            self._suite = SensorSuite(sensors, machinery.population.models, self._moment(time), rng)
+        self._devices: WorldDevices | None = None
+        if machinery.options.devices:
+            from kurumaisu.sim.robots.devices import WorldDevices
+
+            self._devices = WorldDevices(machinery, machinery.options.devices)
 
     def read(self, time: float) -> tuple[Reading, ...]:
         """Return the readings of sensors that are due at a time [s]."""
@@ -48,6 +58,8 @@ class Sensing:
             self._suite.restore(state)
 
     def _moment(self, time: float) -> Moment:
+        from kurumaisu.sim.sensors.suite import Moment
+
         machinery = self._machinery
         solids = machinery.arena if self._solids is None else self._solids.now()
         return Moment(time, machinery.arena, solids, machinery.model_poses(), machinery.rates())

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from kurumaisu.sim.options import Options
 from kurumaisu.sim.rangers.fans import RangerFan
 from kurumaisu.sim.rangers.scans import Scans
 from kurumaisu.sim.robots import snapshot, state
-from kurumaisu.sim.robots.devices import Value
 from kurumaisu.sim.robots.drive import without_nonsense
 from kurumaisu.sim.robots.fleet_effects import check_names
 from kurumaisu.sim.robots.machinery import Machinery
@@ -33,12 +32,15 @@ from kurumaisu.sim.robots.model_changes import (
 from kurumaisu.sim.robots.observation import Observation
 from kurumaisu.sim.robots.population import Population
 from kurumaisu.sim.robots.sensing import Sensing
-from kurumaisu.sim.sensors.settings import EVERY_ROBOT, SensorSettings
-from kurumaisu.sim.sensors.suite import Reading
 from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World, read_snippet
 from kurumaisu.world.model import Model
+
+if TYPE_CHECKING:
+    from kurumaisu.sim.robots.devices import Value
+    from kurumaisu.sim.sensors.settings import SensorSettings
+    from kurumaisu.sim.sensors.suite import Reading
 
 
 class Simulator:
@@ -98,18 +100,18 @@ class Simulator:
             machinery.move()
         if due is not None:
             machinery.locate(due, self._odometry_rng)
-        way = (machinery.before, machinery.frames)
-        machinery.rangers.update(self._step, self.time, way, self._ranger_rng)
+        way, time = (machinery.before, machinery.frames), self.time
+        machinery.rangers.update(self._step, time, way, self._ranger_rng)
         if not self._late:
             machinery.move()
-        self._readings, self._devices = self._sensing.read(self.time), self._sensing.devices(self._step)
+        self._readings, self._devices = self._sensing.read(time), self._sensing.devices(self._step)
         return self.observe()
 
     def observe(self) -> Observation:
         """Return what the last step has, and what was changed since by hand; nothing is measured anew."""
-        machinery = self._machinery
+        machinery, time = self._machinery, self.time
         return Observation(
-            time=self.time,
+            time=time,
             poses=machinery.robot_poses,
             odometry=machinery.localization.estimates.copy(),
             velocities=machinery.drive.velocities.copy(),
@@ -118,7 +120,7 @@ class Simulator:
             dropped=self._dropped,
             readings=self._readings,
             devices=self._devices,
-            reference=machinery.reference(self.time),
+            reference=machinery.reference(time),
         )
 
     def reset_positions(self) -> None:
@@ -267,9 +269,9 @@ class Simulator:
 
     def _power_up(self) -> None:
         """Start the sensors of sensors.yaml and the world's devices; they start anew when models come or go."""
-        names = {robot.name for robot in self.robots} | {EVERY_ROBOT}
+        names = {robot.name for robot in self.robots}
         home = self._machinery is self._home
-        sensors = [sensor for sensor in self._sensors if home or sensor.robot in names]  # at home a wrong name is said
+        sensors = [sensor for sensor in self._sensors if home or sensor.fits(names)]  # at home a wrong name is said
         self._sensing = Sensing(sensors, self._machinery, self.time, self._sensor_rng)
         self._readings, self._devices = (), {}
 

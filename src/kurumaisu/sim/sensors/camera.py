@@ -6,14 +6,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kurumaisu import _core
 from kurumaisu.errors import Error
 from kurumaisu.types import BoolArray, ByteArray, FloatArray, IntArray
 from kurumaisu.world.model import Camera, Model, Polygon
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 GROUND = (255, 255, 255)  # Stage's floor
 SKY = (179, 179, 204)  # what Stage clears its window to: 0.7, 0.7, 0.8

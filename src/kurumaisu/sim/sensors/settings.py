@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +29,10 @@ class SensorSettings:
     rate: float
     mount: FloatArray
     parameters: Parameters
+
+    def fits(self, names: Collection[str | None]) -> bool:
+        """Return whether one of the robots of these names has it."""
+        return self.robot == EVERY_ROBOT or self.robot in names
 
 
 def load_sensors(path: Path) -> tuple[SensorSettings, ...]:

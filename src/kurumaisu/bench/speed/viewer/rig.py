@@ -20,7 +20,7 @@ import yaml
 
 from kurumaisu import children
 from kurumaisu.bench.processes import PATIENCE, master, running
-from kurumaisu.bench.speed.stageros import world_of
+from kurumaisu.bench.speed.user_worlds import cave
 from kurumaisu.bench.speed.viewer.page import Page
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
@@ -114,9 +114,7 @@ def rig_of(simulator: str, robots: int, clocked: Path | None = None) -> Iterator
     """
     with tempfile.TemporaryDirectory() as folder, master() as environment:
         if simulator == "stageros":
-            world = Path(folder) / "bench.world"
-            write_whole({world: world_of(robots, None)})
-            arguments, services = ["-g", str(world)], "/stageros/"
+            arguments, services = ["-g", str(cave(Path(folder), robots, None).path)], "/stageros/"
         else:
             arguments, services = [], "/"
         program = ["-c", _NODE.format(simulator.removesuffix("_node"))]
