@@ -165,7 +165,6 @@ def test_backlash_taken_up_at_the_onset_is_lost_while_a_turn_grows():
     np.testing.assert_allclose(moved, expected, atol=1e-12)
 
 
-
 @given(inputs=st.lists(st.floats(-1, 1), min_size=1, max_size=60), play=st.floats(0, 0.5))
 @settings(max_examples=50)
 def test_backlash_is_never_further_than_half_the_play(inputs, play):

@@ -67,4 +67,6 @@ def test_a_curve_multiplies_the_noise_where_what_it_follows_is_known():
 
 def test_a_curve_of_the_noise_is_checked():
     with pytest.raises(Error, match=r"smooth\.scatter\.v: knots must increase"):
-        effects.check((EffectSetting("smooth.scatter.v", dict.fromkeys(("knot_0", "knot_1", "value_0", "value_1"), 0.0)),))
+        effects.check(
+            (EffectSetting("smooth.scatter.v", dict.fromkeys(("knot_0", "knot_1", "value_0", "value_1"), 0.0)),)
+        )

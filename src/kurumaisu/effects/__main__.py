@@ -76,9 +76,9 @@ the parameter `now`, which the critic sets to its mean.
 
 `smooth.range.COVARIATE` adds such a curve, in metres, to the laser's readings, with the stage BIAS; all of them have
 knots. They follow `range` [m], `incidence`, `bearing`, `heading`, `world_bearing` [rad, within half a turn], `time` [s]
-since the laser was switched on, or `hit_x`, `hit_y` [m] in the map; besides, what is known beside the scans: the chair's
-rates `v`, `w`, and columns of `covariate.csv`, which the simulator does not know. `smooth.scatter.COVARIATE` multiplies
-the noise by exp(curve), with the stage SPREAD.
+since the laser was switched on, or `hit_x`, `hit_y` [m] in the map; besides, what is known beside the scans: the
+chair's rates `v`, `w`, and columns of `covariate.csv`, which the simulator does not know. `smooth.scatter.COVARIATE`
+multiplies the noise by exp(curve), with the stage SPREAD.
 
 ```yaml
 effects:

@@ -25,7 +25,9 @@ class Backlash(Effect):
     forms = ({"onset": 0.0}, {"onset": 1.0})
     empirical = True
     sentence = "the yaw rate has play: it depends on the direction in which its command changed"
-    formula = "w' = min(max(w', w − play/2), w + play/2) while moving, or with onset = 1 w − sign(w) · play/2 in place of w"
+    formula = (
+        "w' = min(max(w', w − play/2), w + play/2) while moving, or with onset = 1 w − sign(w) · play/2 in place of w"
+    )
     source = "assumed: play of joystick or gear; 5-50 mrad/s"
     shows_in = Rate.W
     follows = Follows.W_CHANGE

@@ -24,6 +24,7 @@ from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED, RIVAL
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Comparison
+from kurumaisu.params import EffectSetting
 
 # Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
 # have in common beyond the simplest equation for it moves the mean of a scan as well.
@@ -105,7 +106,7 @@ def _of_readings(
     if curves:  # what was taken for it in the catalogue need not act
         _, search, found = searched(with_own(few.shots, curves[0].setting), curves[0].nats)
     for one in found if curves else ():
-        if effects.by_id(one.setting.id).stage != effects.by_id(curves[0].setting.id).stage:
+        if _stage(one.setting) != _stage(curves[0].setting):
             continue
         rest = [each.setting for each in found if each is not one]
         level = known.alone(curves[0], measured, error, rest)
@@ -114,6 +115,11 @@ def _of_readings(
             curves, search, found = [level, *curves[1:]], other, fewer
             break
     return Scatter(found, curves, _compared(search, statistics, found))
+
+
+def _stage(setting: EffectSetting) -> effects.LaserStage | None:
+    effect = effects.by_id(setting.id)
+    return effect.stage if issubclass(effect, effects.LaserEffect) else None
 
 
 def _compared(search: ScatterSearch, statistics: Statistics, found: Sequence[ScatterEffect]) -> tuple[Comparison, ...]:

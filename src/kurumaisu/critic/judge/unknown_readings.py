@@ -19,7 +19,14 @@ from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3
-_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s", "v": "m/s", "w": "rad/s"}  # all others of RANGE_COVARIATES are angles
+_UNITS = {
+    "range": "m",
+    "hit_x": "m",
+    "hit_y": "m",
+    "time": "s",
+    "v": "m/s",
+    "w": "rad/s",
+}  # all others of RANGE_COVARIATES are angles
 
 
 @dataclass(frozen=True)

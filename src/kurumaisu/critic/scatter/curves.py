@@ -66,7 +66,7 @@ class _Squares:
 
 @dataclass(frozen=True)
 class _Pull:
-    """What speaks for a curve, equations of the noise left free: gram (m, m) and pull (m,) of twice its coefficients."""
+    """What speaks for a curve, laws of the noise left free: gram (m, m) and pull (m,) of twice its coefficients."""
 
     gram: FloatArray
     pull: FloatArray
@@ -119,7 +119,8 @@ class ScatterCurves:
             knots = knots_of(own, _HATS) if np.isfinite(own).all() else np.empty(0)
             if len(knots) < 3:
                 continue
-            bare = Basis(name, knots, {}, (), *(float(end) for end in np.quantile(own, [0.025, 0.975])))
+            low, high = np.quantile(own, [0.025, 0.975]).tolist()
+            bare = Basis(name, knots, {}, (), low, high)
             hats = bare.matrix(own)
             out.append((name, (replace(bare, priors=tuple(priors_of(knots, hats))), hats)))
         return out

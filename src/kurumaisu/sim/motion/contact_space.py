@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 
 import numpy as np
@@ -63,6 +64,12 @@ class ContactSpace:
         self._space.collision_slop = contacts.collision_slop
         self._space.collision_bias = contacts.collision_bias
         self._add_bodies(rigids, poses)
+
+    def __del__(self) -> None:
+        """Take everything apart: a garbage collector would free bodies before or after their shapes, as it comes."""
+        space = getattr(self, "_space", None)
+        if space is not None and not sys.is_finalizing():
+            space.remove(*space.constraints, *space.shapes, *space.bodies)
 
     def add_walls(self, numbers: Iterable[int], ground: Ground) -> None:
         """Add walls of the ground that are not there yet."""
