@@ -2,7 +2,7 @@
 """Something is surely wrong, and the data do not say what: amber, never green.
 
 Drives held out tell it: what was found, though nobody can name it, predicts them better; or the model leaves them
-farther off than the noise allows.
+farther off than the noise allows. Data too few to tell effects from noise do where any noise would make it likelier.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.judge.decide import Decision
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
@@ -38,6 +39,14 @@ def with_unresolved(
     found = made.found
     nats = found.best.score - found.empty.score
     share = max(shares.values(), default=0.0)
+    if not found.enough and _whatever_noise(found) >= _LEAST and share >= _FAR:
+        nearest = " with ".join(sorted(found.best.ids))
+        rows = len(found.empty.beside.residual) // 3
+        words = (
+            f"Something is wrong: after 2 s the chair is off by {100 * share:.0f} % of the way or turn, however loud the "
+            f"noise; {rows} intervals between poses are too few to say what it is. Nearest is {nearest}."
+        )
+        return _amber(criticism, f"off by {100 * share:.0f} % of the way or turn after 2 s; nearest {nearest}", words)
     if gain is not None and gain.log_density_per_sample.lo90 > 0 and nats >= _LEAST and share >= _FAR:
         nearest = " with ".join(sorted(found.best.ids))
         words = (
@@ -55,6 +64,20 @@ def with_unresolved(
         )
         return _amber(criticism, f"held-out motion off {times:.1f} times as far as noise allows", words)
     return criticism
+
+
+def _whatever_noise(found: SearchResult) -> float:
+    """Return the evidence [nat] of the best set over nothing if nobody knew how loud the noise is.
+
+    With the likeliest level of either: that which was estimated had few rows to go by.
+    """
+    best, empty = found.best, found.empty
+    left, before = -2 * best.log_likelihood, -2 * empty.log_likelihood
+    free = len(empty.beside.residual) - best.sizes
+    if min(left, before, free) <= 0:
+        return 0.0
+    costs = (best.score - best.log_likelihood) - (empty.score - empty.log_likelihood)
+    return 0.5 * free * float(np.log(before / left)) + costs
 
 
 def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
