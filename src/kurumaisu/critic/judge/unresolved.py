@@ -39,22 +39,18 @@ def with_unresolved(
     found = made.found
     nats = found.best.score - found.empty.score
     share = max(shares.values(), default=0.0)
-    if not found.enough and _whatever_noise(found) >= _LEAST and share >= _FAR:
-        nearest = " with ".join(sorted(found.best.ids))
-        rows = len(found.empty.beside.residual) // 3
-        words = (
-            f"Something is wrong: after 2 s the chair is off by {100 * share:.0f} % of the way or turn, however loud the "
-            f"noise; {rows} intervals between poses are too few to say what it is. Nearest is {nearest}."
-        )
-        return _amber(criticism, f"off by {100 * share:.0f} % of the way or turn after 2 s; nearest {nearest}", words)
+    off = f"off by {100 * share:.0f} % of the way or turn"
+    nearest = " with ".join(sorted(found.best.ids))
+    shape, begun = f"{off} after 2 s; nearest {nearest}", f"Something is wrong: after 2 s the chair is {off}"
     if gain is not None and gain.log_density_per_sample.lo90 > 0 and nats >= _LEAST and share >= _FAR:
-        nearest = " with ".join(sorted(found.best.ids))
         words = (
-            f"Something is wrong: after 2 s the chair is off by {100 * share:.0f} % of the way or turn, and held-out "
-            f"data confirm it; but these data do not say what it is. Nearest is {nearest} "
+            f"{begun}, and held-out data confirm it; but these data do not say what it is. Nearest is {nearest} "
             f"(--only {','.join(sorted(found.best.ids))})."
         )
-        return _amber(criticism, f"off by {100 * share:.0f} % of the way or turn after 2 s; nearest {nearest}", words)
+        return _amber(criticism, shape, words)
+    if not found.enough and _whatever_noise(found) >= _LEAST and share >= _FAR:
+        few = f"{len(found.empty.beside.residual) // 3} intervals between poses are too few to say what it is"
+        return _amber(criticism, shape, f"{begun}, however loud the noise; {few}. Nearest is {nearest}.")
     louder = least_variance(made.problem, held_out)
     if louder > _LOUDER:
         times = float(np.sqrt(louder))
