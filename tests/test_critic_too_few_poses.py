@@ -7,10 +7,11 @@ import pytest
 from hidden_effect import recording
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.judge.unresolved import COVARIATE
+from kurumaisu.critic.judge import unresolved
 from kurumaisu.params import shipped
 
 SPARSE = 25  # of so many poses one is left
+judged = unresolved.with_unresolved
 
 
 def sparse(data):
@@ -20,15 +21,29 @@ def sparse(data):
     return replace(data, runs=(replace(run, pose=few),), train=(run.name,), test=())
 
 
-@pytest.mark.parametrize(("effect", "size"), [("base.gain_v", 0.25), (None, 0.0)])
-def test_a_quarter_too_much_is_said_of_a_dozen_poses(effect, size):
-    criticism = pipeline.criticise(
-        sparse(recording(effect, size, 70, 40.0)), shipped("launch/md100.yaml"), lambda _: None
+@pytest.mark.parametrize(
+    ("effect", "size", "confirmed", "words"),
+    [
+        ("base.gain_v", 0.25, True, "held-out data confirm it; but these data do not say what it is"),
+        (
+            "base.gain_v",
+            0.25,
+            False,
+            "however loud the noise; 16 intervals between poses are too few",
+        ),
+        (None, 0.0, False, "None of the 30 effects can be detected"),
+    ],
+)
+def test_a_quarter_too_much_is_said_of_a_dozen_poses(monkeypatch, effect, size, confirmed, words):
+    monkeypatch.setattr(
+        unresolved,
+        "with_unresolved",
+        lambda criticism, made, gain, *more: judged(criticism, made, gain if confirmed else None, *more),
     )
+    data = sparse(recording(effect, size, 70, 40.0))
+    criticism = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None)
+    assert words in criticism.story.headline
     verdict = criticism.verdict
     assert verdict.causes == ()
-    if effect is None:
-        assert verdict.verdict == "none"
-        return
-    assert (verdict.verdict, verdict.unknown[0].covariate) == ("unknown", COVARIATE)
-    assert "too few to say what it is" in criticism.story.headline
+    assert verdict.verdict == ("none" if effect is None else "unknown")
+    assert [one.covariate for one in verdict.unknown] == ([] if effect is None else [unresolved.COVARIATE])
