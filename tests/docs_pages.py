@@ -135,6 +135,13 @@ SCENES: tuple[tuple[Step | End, ...], ...] = (
         Step(r"critic rehearse .*hidden\.yaml"),
         Step(r"critic drives$", codes=_VERDICTS),
     ),
+    (
+        Step(r"launch/md100\.yaml; echo .*> wheels\.yaml"),
+        Step(r"echo .*> wrong\.yaml"),
+        Step(r"critic rehearse .*wrong\.yaml"),
+        Step(r"critic look wheels$"),
+        Step(r"critic wheels$", codes=_VERDICTS),
+    ),
     (Step(r"critic DAY_1 DAY_2", codes=_VERDICTS),),
     (Step(r"critic rehearse spin_both_ways"),),
     (Step(r"critic plan"),),

@@ -55,7 +55,7 @@ def _in_words(found: Multipliers, robot: Robot) -> str:
     before, after = quantities([found.square_before, found.square_after], "m")
     square = f"UMBmark's square of 4 m ends {before} from its start"
     if found.square_after < found.square_before:
-        square += f"; with the multipliers below {after}, their uncertainty included"
+        square += f"; with the multipliers for its controller, {after}, their uncertainty included"
     else:
         square += "; these drives know of no multipliers that would surely close it better"
     return f"It {'skids, and ' if robot.skids else ''}turns {track}; its software has {robot.track:g} m. {square}."
