@@ -166,6 +166,21 @@ def test_noise_is_scaled_and_has_its_variance(tmp_path: Path) -> None:
     assert (errors**2).sum() / (4 * 0.0001) == pytest.approx(n, abs=5 * math.sqrt(2 * n))
 
 
+def test_noise_follows_what_the_robot_does(tmp_path: Path) -> None:
+    """Twice as much from 0.4 m/s on, of the same draws."""
+    noisy = ROOM + robot(LASER.replace("fov 180", "fov 60 noise [0.0001 0 0]"), "-4 0 0 0")
+    curve = EffectSetting("smooth.scatter.v", {"knot_0": 0.0, "knot_1": 0.4, "value_0": 0.0, "value_1": math.log(2)})
+    plain, shaken = (
+        build(tmp_path, noisy, *entries, timing="consistent") for entries in ((), (RobotEffects("*", (curve,)),))
+    )
+    for command, factor in (((0, 0, 0), 1), ((0.4, 0, 0), 2), ((-0.4, 0, 0), 1)):
+        one, other = (np.array([o.scans[0].ranges for o in drive(sim, command, 5)]) for sim in (plain, shaken))
+        still = build(tmp_path, noisy.replace("noise [0.0001 0 0]", ""), timing="consistent")
+        still.set_pose(still.robots[0], [*plain.observe().poses[0, :2], 0, 0])
+        truth = still.step(np.zeros((1, 3))).scans[0].ranges
+        np.testing.assert_allclose(other[-1] - truth, factor * (one[-1] - truth), atol=1e-6)
+
+
 def test_a_laser_without_noise_gets_some(tmp_path: Path) -> None:
     sim = build(tmp_path, ROOM + robot(LASER), on("*", laser__range_noise={"slope": 0.01}))
     truth = 5 / np.cos(sim.rangers[0].bearings)

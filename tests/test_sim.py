@@ -187,6 +187,20 @@ def scans(simulator: ChairSimulator, command: Command, count: int) -> Iterator[t
             yield scan.ranges, scan.pose, scan.time
 
 
+def test_noise_follows_what_the_chair_does(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
+    """Four times as much from 0.3 m/s backwards on."""
+    wall = "model ( pose [2.35 0 0 0] size [0.1 20 1] )"
+    values = {"knot_0": -0.3, "knot_1": 0.0, "value_0": math.log(4), "value_1": 0.0}
+    shaken = replace(model, effects=(EffectSetting("smooth.scatter.v", values),))
+    spread = []
+    for one in (model, shaken):
+        simulator = ChairSimulator(one, walled(tmp_path, wall), dynamics)
+        simulator.reset(11)
+        moving = [np.diff(ranges, 2)[330:350] for ranges, _, _ in scans(simulator, rates_command(model, -0.4, 0.0), 20)]
+        spread.append(np.std(moving[5:]))
+    assert spread[1] / spread[0] == pytest.approx(4, rel=0.2)
+
+
 def test_a_flat_wall_reads_as_equation_4(model: Model, dynamics: Dynamics, tmp_path: Path) -> None:
     # 1 m before the laser, whose mount is 0.3 m before base_link; figure 7's wall.
     wall = "model ( pose [1.35 0 0 0] size [0.1 20 1] )"
