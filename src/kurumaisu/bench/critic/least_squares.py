@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from kurumaisu.geometry import between
 from kurumaisu.types import FloatArray, IntArray
 
 _SPAN = 2.0  # [s] over which motion is compared
@@ -52,11 +53,9 @@ def path(inputs: Inputs, values: FloatArray) -> FloatArray:
     return np.column_stack([np.interp(inputs.times, edges, column) for column in (x, y, theta)])
 
 
-def moved(poses: FloatArray, starts: IntArray, ends: IntArray) -> FloatArray:
+def moved(poses: FloatArray, rows: tuple[IntArray, IntArray]) -> FloatArray:
     """Return the motion (k, 3) from some rows of poses to others, in the frame of the first."""
-    a, d = poses[starts], poses[ends] - poses[starts]
-    c, s = np.cos(a[:, 2]), np.sin(a[:, 2])
-    return np.column_stack([c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0], d[:, 2]])
+    return between(*(poses[some] for some in rows))
 
 
 def ahead(times: FloatArray, seconds: float) -> tuple[IntArray, IntArray]:
@@ -68,7 +67,7 @@ def ahead(times: FloatArray, seconds: float) -> tuple[IntArray, IntArray]:
 
 def _off(inputs: Inputs, values: FloatArray) -> FloatArray:
     rows = ahead(inputs.times, _SPAN)
-    off = moved(path(inputs, values), *rows) - moved(inputs.poses, *rows)
+    off = moved(path(inputs, values), rows) - moved(inputs.poses, rows)
     return np.asarray((off * [1.0, 1.0, _ARM]).ravel())
 
 

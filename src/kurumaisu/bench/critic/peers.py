@@ -25,6 +25,7 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import Multipliers
 from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
 from kurumaisu.params import Robot, robot_of, shipped
 from kurumaisu.settings import Section
 from kurumaisu.types import FloatArray
@@ -128,8 +129,8 @@ def _errors(judged: Inputs, path: FloatArray) -> list[float]:
     out = []
     for seconds in _AFTER:
         rows = least_squares.ahead(judged.times, seconds)
-        off = least_squares.moved(path, *rows) - least_squares.moved(judged.poses, *rows)
-        turned = np.angle(np.exp(1j * off[:, 2]))
+        off = least_squares.moved(path, rows) - least_squares.moved(judged.poses, rows)
+        turned = wrap(off[:, 2])
         out += [1000 * float(np.sqrt(np.mean(off[:, 0] ** 2 + off[:, 1] ** 2)))]
         out += [float(np.degrees(np.sqrt(np.mean(turned**2))))]
     return out

@@ -45,9 +45,8 @@ def summary(outcome: Outcome, width: int) -> str:
         lines.append(f"  data: {said[0]}{f' (and {len(said) - 1} more like it)' if len(said) > 1 else ''}")
     if verdict.gain is not None:
         lines += _gain(verdict.gain)
-    lines += (
-        ["for diff_drive_controller:", *(f"  {line}" for line in outcome.paste.split("\n"))] if outcome.paste else []
-    )
+    if outcome.paste:
+        lines += ["for diff_drive_controller:", *(f"  {line}" for line in outcome.paste.split("\n"))]
     lines += [f"drive next: {outcome.next_drive}"] if outcome.next_drive else []
     return "\n".join(_wrapped(printable(line), width) for line in lines)
 

@@ -31,6 +31,11 @@ class Wheels:
     topic: str = ""
     ticks_per_turn: float | None = None
 
+    @property
+    def turn(self) -> float:
+        """Return by what the numbers are angles [rad], or rates of them."""
+        return 1.0 if self.ticks_per_turn is None else 2 * np.pi / self.ticks_per_turn
+
     def motion(self, wheels: FloatArray) -> FloatArray:
         """Return way and turn, (n, 2), of angles of the left and the right wheel, (n, 2), or the rates of rates."""
         left, right = self.radius * wheels.T
@@ -50,12 +55,11 @@ def with_wheels(where: str, parts: dict[str, Series | None], robot: Robot | None
             )
         if robot is None or robot.radius is None or robot.track is None:
             raise Error(f"{where}/{name}: how large the wheels are is not said: `robot` in meta.yaml, radius and track")
-        wheels = Wheels((), (), robot.radius, robot.track)
         table = parts.pop(name)
         assert table is not None
         angles = name == WHEEL_TABLES[0]
-        share = 2 * np.pi / robot.ticks_per_turn if angles and robot.ticks_per_turn is not None else 1.0
-        moved = wheels.motion(share * (np.diff(table.values, axis=0) if angles else table.values))
+        wheels = Wheels((), (), robot.radius, robot.track, ticks_per_turn=robot.ticks_per_turn if angles else None)
+        moved = wheels.motion(wheels.turn * (np.diff(table.values, axis=0) if angles else table.values))
         poses = along(moved) if angles else driven_by(table.t, moved)
         rates = rates_between(table.t, poses) if angles else moved
         parts["odom"] = Series(table.t, np.column_stack([poses, rates]), COLUMNS)

@@ -82,10 +82,7 @@ def _rates(path: Path, wheels: Wheels) -> tuple[FloatArray, FloatArray, FloatArr
         raise Error(f"{path}: wheels: there is no topic {name}; for joints of a JointState, say wheels.topic too")
     t = found[sides[0][0]].times()
     left, right = (np.mean([_at(t, found[name]) for name in names], axis=0) for names in sides)
-    if wheels.ticks_per_turn is None:
-        return t, left, right, False
-    share = 2 * np.pi / wheels.ticks_per_turn
-    return t, share * left, share * right, True
+    return t, wheels.turn * left, wheels.turn * right, wheels.ticks_per_turn is not None
 
 
 def _number(kind: str) -> Any:

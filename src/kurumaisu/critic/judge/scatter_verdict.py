@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -99,31 +98,26 @@ def _of_readings(
         return simulate, search, search.run()
 
     simulate, search, found = searched(few.shots)
-    if strange or (ids is not None and effects.SMOOTH not in ids):
-        return Scatter(found, [], _compared(search, statistics, found))
-    known = ScatterCurves(few, statistics, simulate, [each.setting for each in found])
-    curves = known.run(measured, error)
+    known = ScatterCurves(few, statistics, simulate, error)
+    asked = not strange and (ids is None or effects.SMOOTH in ids)
+    curves = known.run([each.setting for each in found]) if asked else []
     if curves:  # what was taken for it in the catalogue need not act
         _, search, found = searched(with_own(few.shots, curves[0].setting), curves[0].nats)
     for one in found if curves else ():
         if _stage(one.setting) != _stage(curves[0].setting):
             continue
-        rest = [each.setting for each in found if each is not one]
-        level = known.alone(curves[0], measured, error, rest)
+        level = known.alone(curves[0], [each.setting for each in found if each is not one])
         _, other, fewer = searched(with_own(few.shots, level.setting), level.nats)
         if len(fewer) < len(found):
             curves, search, found = [level, *curves[1:]], other, fewer
             break
-    return Scatter(found, curves, _compared(search, statistics, found))
+    compared = (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
+    return Scatter(found, curves, compared)
 
 
 def _stage(setting: EffectSetting) -> effects.LaserStage | None:
     effect = effects.by_id(setting.id)
     return effect.stage if issubclass(effect, effects.LaserEffect) else None
-
-
-def _compared(search: ScatterSearch, statistics: Statistics, found: Sequence[ScatterEffect]) -> tuple[Comparison, ...]:
-    return (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
 
 
 def open_set(scatter: ScatterEffect) -> tuple[str, ...]:

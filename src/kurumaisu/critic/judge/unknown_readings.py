@@ -19,14 +19,8 @@ from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3
-_UNITS = {
-    "range": "m",
-    "hit_x": "m",
-    "hit_y": "m",
-    "time": "s",
-    "v": "m/s",
-    "w": "rad/s",
-}  # all others of RANGE_COVARIATES are angles
+# All others of RANGE_COVARIATES are angles.
+_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s", "v": "m/s", "w": "rad/s"}
 
 
 @dataclass(frozen=True)
@@ -54,8 +48,8 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
 
 
 def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:
-    """Yield curves that the noise of readings follows."""
-    for one in curves:
+    """Yield the curve that the noise of readings follows, and the next ones that could stand in for it."""
+    for one in curves[:_LISTED]:
         curve = ReadingCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
         yield Unknown(UNKNOWN_SCATTER, _called(one.basis), f"of the noise: {shape(curve, '%')}", one.p)
 

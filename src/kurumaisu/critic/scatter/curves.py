@@ -30,7 +30,6 @@ _HATS = 10
 _SEEDS = range(2000, 2030)  # simulations that say what squares are to be expected, and how far sums are off by chance
 _ENOUGH = 5.0  # [nat] from which a curve is told, as an effect on the scatter is
 _MATTERS = 0.1  # share of the noise by which it must make it differ
-_LISTED = 3
 _ROUNDS = 2  # steps of a fit
 _LEAST = 0.05  # of the mean square that is expected anywhere
 
@@ -73,42 +72,38 @@ class _Pull:
 
 
 class ScatterCurves:
-    """Curves of some shots, in a model with effects on how their readings scatter."""
+    """Curves of some shots."""
 
     def __init__(
-        self, assembly: Assembly, statistics: Statistics, simulate: ScatterSimulator, beside: Sequence[EffectSetting]
+        self, assembly: Assembly, statistics: Statistics, simulate: ScatterSimulator, error: FloatArray
     ) -> None:
-        self._statistics, self._simulate, self._beside = statistics, simulate, tuple(beside)
+        """Take shots; error (k, b) [m]: of their readings, off the mean."""
+        self._statistics, self._simulate = statistics, simulate
         self._trust = assembly.geometry
+        self._measured = self._squares(assembly.shots.measured, error)
         known = dict(self._hats(covariates(assembly.shots, assembly.marks.seen)))
         level = np.ones((int(self._trust.sum()), 1))
         self._laws = np.column_stack([level, *(known[name][1] for name in _LAWS if name in known)])
         self._curves = {name: each for name, each in known.items() if name not in _LAWS}
 
-    def run(self, readings: FloatArray, error: FloatArray) -> list[ScatterCurve]:
-        """Return the curve that acts, and the next ones that could stand in for it; none where there is too little.
-
-        readings, error (k, b) [m]: measured, and off their mean.
-        """
-        measured = self._squares(readings, error)
-        simulated = self._simulated(self._beside)
-        found = [self._weighed(name, measured, simulated) for name in self._curves]
+    def run(self, beside: Sequence[EffectSetting]) -> list[ScatterCurve]:
+        """Return the curve that acts beside effects, and the others behind it; none where there is too little."""
+        simulated = self._simulated(beside)
+        found = [self._weighed(name, simulated) for name in self._curves]
         total = logsumexp([0.0, *(one.nats for one in found)])
         found = [replace(one, p=float(np.exp(one.nats - total))) for one in sorted(found, key=lambda one: -one.nats)]
         if not found or found[0].nats < _ENOUGH:
             return []
-        best = self._refined(found[0], measured, self._beside, self._laws)
+        best = self._refined(found[0], beside, self._laws)
         _, hats = self._curves[best.basis.covariate]
-        return [best, *found[1:_LISTED]] if float(np.std(hats @ best.coefficients)) >= _MATTERS else []
+        return [best, *found[1:]] if float(np.std(hats @ best.coefficients)) >= _MATTERS else []
 
-    def alone(
-        self, one: ScatterCurve, readings: FloatArray, error: FloatArray, beside: Sequence[EffectSetting]
-    ) -> ScatterCurve:
-        """Return a curve fitted beside some effects with all that these leave, its level and what laws might have."""
-        measured, level = self._squares(readings, error), np.ones(len(one.coefficients))
+    def alone(self, one: ScatterCurve, beside: Sequence[EffectSetting]) -> ScatterCurve:
+        """Return a curve fitted beside effects with all that these leave, its level and what laws might have."""
+        level = np.ones(len(one.coefficients))
         free = replace(one, prior=one.prior + _LAW**2 * np.outer(level, level))
         for _ in range(_ROUNDS):
-            free = self._refined(free, measured, beside, self._laws[:, :0])
+            free = self._refined(free, beside, self._laws[:, :0])
         return free
 
     def _hats(self, at: Mapping[str, FloatArray]) -> Sequence[tuple[str, tuple[Basis, FloatArray]]]:
@@ -133,23 +128,21 @@ class ScatterCurves:
         each = [self._squares(*self._simulate.scans(settings, seed)) for seed in _SEEDS]
         return _Squares(np.array([one.values for one in each]), np.array([one.counted for one in each]))
 
-    def _weighed(self, name: str, measured: _Squares, simulated: _Squares) -> ScatterCurve:
+    def _weighed(self, name: str, simulated: _Squares) -> ScatterCurve:
         basis, _ = self._curves[name]
-        speaks = self._pull(name, measured, simulated, self._laws)
+        speaks = self._pull(name, simulated, self._laws)
         evidence = curve_evidence(speaks.gram, speaks.pull, basis.priors)
         nats = evidence.nats + float(np.log(UNKNOWN_ODDS / len(self._curves)))
         return _stepped(ScatterCurve(basis, np.zeros(basis.size), evidence.prior, evidence.prior, nats, 0.0), speaks)
 
-    def _refined(
-        self, one: ScatterCurve, measured: _Squares, beside: Sequence[EffectSetting], laws: FloatArray
-    ) -> ScatterCurve:
+    def _refined(self, one: ScatterCurve, beside: Sequence[EffectSetting], laws: FloatArray) -> ScatterCurve:
         """Return a curve after another step: beside other noise its own has to be larger."""
         simulated = self._simulated([*beside, one.setting])
-        return _stepped(one, self._pull(one.basis.covariate, measured, simulated, laws))
+        return _stepped(one, self._pull(one.basis.covariate, simulated, laws))
 
-    def _pull(self, name: str, measured: _Squares, simulated: _Squares, laws: FloatArray) -> _Pull:
+    def _pull(self, name: str, simulated: _Squares, laws: FloatArray) -> _Pull:
         """Return what the squares say of a curve, beyond those of simulations; laws (n, l): what is left free."""
-        _, hats = self._curves[name]
+        measured, (_, hats) = self._measured, self._curves[name]
         columns = np.column_stack([laws, hats])
         number = np.maximum(simulated.counted.sum(axis=0), 1)
         mean, weight = simulated.values.sum(axis=0) / number, np.sqrt(simulated.counted.mean(axis=0))
