@@ -82,11 +82,7 @@ class Case:
     def followed(self) -> bool:
         """Tell whether one of the first three curves is over what the unknown follows."""
         accepted = (self.truth["unknown"] or {}).get("covariates", ())
-        said = (
-            [one.covariate.replace("|", "abs_", 1).replace("|", "") for one in self.verdict.unknown[:3]]
-            if self.verdict
-            else []
-        )
+        said = [_as_strangers_say(one.covariate) for one in self.verdict.unknown[:3]] if self.verdict else []
         return any(name in said or f"time_{name}" in said or f"distance_{name}" in said for name in accepted)
 
 
@@ -169,6 +165,11 @@ def _said(prediction: Prediction) -> Iterator[tuple[tuple[str, str, float, float
 
 def _density(value: float, mean: float, sd: float) -> float:
     return -0.5 * ((value - mean) / sd) ** 2 - float(np.log(sd))
+
+
+def _as_strangers_say(covariate: str) -> str:
+    """Return what the generators call what the critic calls so."""
+    return covariate.replace("|", "abs_", 1).replace("|", "").replace("world bearing", "direction")
 
 
 def _share(hit: Callable[[Case], bool], cases: Sequence[Case]) -> str:

@@ -96,7 +96,8 @@ class ScatterCurves:
             return []
         best = self._refined(found[0], beside, self._laws)
         _, hats = self._curves[best.basis.covariate]
-        return [best, *found[1:]] if float(np.std(hats @ best.coefficients)) >= _MATTERS else []
+        low, high = np.quantile(hats @ best.coefficients, [0.025, 0.975])
+        return [best, *found[1:]] if high - low >= _MATTERS else []
 
     def alone(self, one: ScatterCurve, beside: Sequence[EffectSetting]) -> ScatterCurve:
         """Return a curve fitted beside effects with all that these leave, its level and what laws might have."""

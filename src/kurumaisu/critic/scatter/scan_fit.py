@@ -61,12 +61,20 @@ def fluctuating(z: FloatArray, inside: BoolArray, stand: IntArray) -> tuple[Floa
 class ScanFit:
     """The fit of some readings of each scan."""
 
-    def __init__(self, basis: FloatArray, size: FloatArray, sd: FloatArray, trust: BoolArray, stand: IntArray) -> None:
+    def __init__(
+        self,
+        basis: FloatArray,
+        size: FloatArray,
+        sd: FloatArray,
+        trust: BoolArray,
+        stand: IntArray,
+        moved: FloatArray,
+    ) -> None:
         """Take basis (k, b, q), sizes (k, q), deviations (k, b) [m], and stands (k,) as of a layout.
 
-        trust (k, b): readings that say anything.
+        trust (k, b): readings that say anything; moved (k, b) [m]: what errors of the poses do that are known already.
         """
-        self._sd, self._trust, self._stand = sd, trust, stand
+        self._sd, self._trust, self._stand, self._moved = sd, trust, stand, moved / sd
         weighed = np.asarray(basis * (trust / sd)[:, :, np.newaxis])
         inner = np.asarray(weighed.transpose(0, 2, 1) @ weighed, dtype=np.float64)
         inner = inner + np.eye(inner.shape[1]) * (size**-2)[:, np.newaxis, :]
@@ -85,8 +93,7 @@ class ScanFit:
         """
         z = error / self._sd
         known = self._trust & np.isfinite(z)
-        fitted = np.zeros_like(z)
-        inside = expected_readings(z, known, self._reach)
+        fitted, inside = expected_readings(z, known, self._reach, self._moved)
         coefficients = np.zeros(self._solve.shape[:2])
         for _ in range(_ROUNDS):
             filled = np.where(inside, np.nan_to_num(z), fitted).astype(np.float32)

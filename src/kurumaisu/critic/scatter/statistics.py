@@ -77,6 +77,7 @@ class Statistics:
         self._cells = _cells(assembly)
         self._stand = assembly.layout.stand
         self._basis, self._size = basis_of(assembly, noise)
+        self._moved = assembly.moved
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
         limit = steepest(seen.level, seen.incidence)[:, :, axes]
         self._moves = np.clip(self._basis, -limit, limit)
@@ -188,7 +189,7 @@ class Statistics:
             if len(self._fits) >= _KEPT:
                 del self._fits[next(iter(self._fits))]
             trust = self._trust & inside_ends(self._base, ends, _WITHIN * self._reach)
-            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand)
+            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand, self._moved)
         return self._fits[ends].leftover(error)
 
 

@@ -34,7 +34,7 @@ class Room:
         out = ['define wall model ( color "gray30" gui_nose 0 )']
         for k, (x, y, a, m, b, s) in enumerate(self.boxes.tolist()):
             pose = f"[ {x:.4f} {y:.4f} 0 {np.degrees(a):.4f} ]"
-            out.append(f'wall ( name "w{k + 1}" pose {pose} size [ {m:.4f} {b:.4f} 1.0 ] laser_return {s:g} )')
+            out.append(f'wall ( name "w{k + 1}" pose {pose} size [ {m:.4f} {b:.4f} 1.0 ] ranger_return {s:g} )')
         return "\n".join(out).replace("wall ( name", "model ( name") + "\n"
 
 

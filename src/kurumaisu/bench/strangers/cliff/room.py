@@ -118,5 +118,5 @@ def world_text(room: Room) -> str:
     for k, (x, y, a, long, thick) in enumerate(room.boxes):
         pose = f"{x:.4f} {y:.4f} 0 {np.degrees(a):.5f}"
         size = f"{long:.4f} {thick:.4f} 1.0"
-        lines.append(f'model ( name "w{k + 1}" pose [ {pose} ] size [ {size} ] laser_return {room.shine[k]:g} )')
+        lines.append(f'model ( name "w{k + 1}" pose [ {pose} ] size [ {size} ] ranger_return {room.shine[k]:g} )')
     return "\n".join(lines) + "\n"

@@ -76,7 +76,7 @@ class Room:
         for k, (x, y, a, length, thick) in enumerate(self.boxes.tolist()):
             shine = 0.3 if self.dark[k] else 1
             text += f'model ( name "w{k + 1}" pose [ {x:.4f} {y:.4f} 0 {np.degrees(a):.4f} ] '
-            text += f"size [ {length:.4f} {thick:.4f} 1.0 ] laser_return {shine} )\n"
+            text += f"size [ {length:.4f} {thick:.4f} 1.0 ] ranger_return {shine} )\n"
         return text
 
 

@@ -51,7 +51,7 @@ class Room:
         for i, (x, y, a, length, thick) in enumerate(boxes):
             back = 0.5 if dark and self.dark[i] else 1
             name = f'model ( name "w{i + 1}" pose [ {x:.4f} {y:.4f} 0 {np.degrees(a):.4f} ]'
-            lines.append(f"{name} size [ {length:.4f} {thick:.4f} 1.0 ] laser_return {back} )")
+            lines.append(f"{name} size [ {length:.4f} {thick:.4f} 1.0 ] ranger_return {back} )")
         return "\n".join(lines) + "\n"
 
 

@@ -33,15 +33,26 @@ class BeamNoise:
     own_sd: float = 0.0
 
 
-def expected_readings(z: FloatArray, known: BoolArray, reach: FloatArray) -> BoolArray:
-    """Return which readings are of what was to be met; z: in deviations from there, nothing fitted yet.
+def expected_readings(
+    z: FloatArray, known: BoolArray, reach: FloatArray, moved: FloatArray
+) -> tuple[FloatArray, BoolArray]:
+    """Return what a fit of z may begin with, and which readings are of what was to be met about that, (k, b) each.
 
-    reach: by how many deviations errors that a scan shares move each of them, 1 sd. A scan whose first fit gives way to
-    readings that are off by metres comes near none of the others, ever.
+    z: in deviations from what was to be met, nothing fitted yet; reach: by how many of them errors that a scan shares
+    move each reading, 1 sd; moved: what errors of the poses do that are known already. A scan whose first fit gives way
+    to readings that are off by metres comes near none of the others, ever; of one whose reference is far off nearly
+    all are, but not from where the scan has put it.
     """
-    width = SIGMA_PER_MAD * float(np.median(np.abs(z[known]))) if known.any() else 0.0
-    with np.errstate(invalid="ignore"):
-        return np.asarray(known & (np.abs(z) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
+
+    def about(start: FloatArray) -> BoolArray:
+        left = z - start
+        width = SIGMA_PER_MAD * float(np.median(np.abs(left[known]))) if known.any() else 0.0
+        with np.errstate(invalid="ignore"):
+            return np.asarray(known & (np.abs(left) < np.maximum(max(ELSEWHERE, OUTLIER * width), OUTLIER * reach)))
+
+    here, there = about(np.zeros_like(z)), about(moved)
+    better = (there.sum(axis=1) > here.sum(axis=1))[:, np.newaxis]
+    return np.where(better, moved, 0.0), np.where(better, there, here)
 
 
 def estimate_reading_noise(

@@ -108,7 +108,8 @@ class Assembly:
         self.shots = shots
         self.marks = EffectColumns(shots)
         self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
-        self.residual = unrounded(shots.measured) - self.marks.base + np.einsum("kbi,kbi->kb", self.poses, shots.shift)
+        self.moved = np.einsum("kbi,kbi->kb", self.poses, shots.shift)  # (k, b) [m] by errors of the reference
+        self.residual = unrounded(shots.measured) - self.marks.base + self.moved
 
     def _trust(self) -> BeamNoise:
         one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
@@ -167,7 +168,8 @@ class Assembly:
         size = np.array([_BROAD.position_sd, _BROAD.position_sd, _BROAD.heading_sd])
         with np.errstate(invalid="ignore"):
             reach = np.sqrt(np.sum((self.poses * size) ** 2, axis=2)) / self.first.sd
-            return replace(self.first, valid=expected_readings(self.residual / self.first.sd, self.first.valid, reach))
+            off, moved = self.residual / self.first.sd, self.moved / self.first.sd
+        return replace(self.first, valid=expected_readings(off, self.first.valid, reach, moved)[1])
 
     def refine(self, fitted: Sequence[Form], beam: BeamNoise, scan: ScanNoise) -> None:
         """Put in place of each fitted form's shape the one between those of the grid that explains most."""
@@ -202,7 +204,8 @@ class Assembly:
         out.hats = [self.hats[row] for row in rows]
         out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
         out.motion = None if self.motion is None else [self.motion[row] for row in rows]
-        out.residual, out.poses, out.geometry = self.residual[rows], self.poses[rows], self.geometry[rows]
+        out.residual, out.moved, out.poses = self.residual[rows], self.moved[rows], self.poses[rows]
+        out.geometry = self.geometry[rows]
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out
 
