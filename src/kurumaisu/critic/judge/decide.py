@@ -76,11 +76,15 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     found = search.search(first, progress)
     made = _settled(first, found, likelier_curve(found), truth, progress)
     hint = _hinted_curve(first, found) if made.extension is None and found.enough else None
-    if hint is not None:
-        other = _settled(first, found, hint, truth, progress)
-        if other.extension is not None and _log_density(other) > _log_density(made) + _LEAST:
-            return other
-    return made
+    if hint is None:
+        return made
+    density = _log_density(made.problem, made.found.log_posterior(_likeliest(made.found)))
+    about = first.changed(noise=_noise_about(first, found, hint, truth, progress).noise)
+    if _density_with(about, hint, found) < density + _HINT:
+        return made
+    other = _settled(first, found, hint, truth, progress)
+    likelier = _log_density(other.problem, other.found.log_posterior(_likeliest(other.found))) > density + _LEAST
+    return other if other.extension is not None and likelier else made
 
 
 def _settled(
@@ -89,21 +93,15 @@ def _settled(
     """Return what acts in the noise about what was found, a curve among it or not; anew where others act then."""
     problem: Problem | None = None
     for _ in range(_ANEW):
-        extension = None if curve is None else fitted_curve(first, curve)
-        about = found.best if curve is None else curve.fit
-        progress("estimating the noise again, with the effects found")
-        left = noise_residuals(first, about, truth, project=True, beside=extension)
-        final = left.estimate(first.noise)
-        growth = left.growth(final, odds(len(found.p)))
-        noise = growth.noise if growth.p > 1 / 2 else final.noise
-        if problem is not None and base_noise.alike(noise, problem.noise):
+        growth = _noise_about(first, found, curve, truth, progress)
+        if problem is not None and base_noise.alike(growth.noise, problem.noise):
             break
-        if problem is None and curve is None and base_noise.alike(noise, first.noise):
+        if problem is None and curve is None and base_noise.alike(growth.noise, first.noise):
             problem = first
             break
-        problem = first.changed(noise=noise)
+        problem = first.changed(noise=growth.noise)
         before, had = found, curve
-        found = search.search(problem, progress, about)
+        found = search.search(problem, progress, found.best if curve is None else curve.fit)
         curve = likelier_curve(found)
         if found.best.ids == before.best.ids and (curve is None) == (had is None):
             break
@@ -111,25 +109,46 @@ def _settled(
     return Decision(problem, found, growth, None if curve is None else fitted_curve(problem, curve))
 
 
+def _noise_about(
+    first: Problem, found: SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
+) -> base_noise.NoiseGrowth:
+    """Return the noise about what was found, or about a curve, and whether it grows with the rates."""
+    progress("estimating the noise again, with the effects found")
+    extension = None if curve is None else fitted_curve(first, curve)
+    left = noise_residuals(first, found.best if curve is None else curve.fit, truth, project=True, beside=extension)
+    final = left.estimate(first.noise)
+    growth = left.growth(final, odds(len(found.p)))
+    return growth if growth.p > 1 / 2 else replace(growth, noise=final.noise)
+
+
 def _hinted_curve(problem: Problem, found: SearchResult) -> SetWithCurve | None:
-    """Return the best curve beside nothing or what was found, if it may well act were nothing slow in the noise."""
+    """Return the best curve beside nothing or what was found, if that may well act were nothing slow in the noise."""
     noise = problem.noise
     easy = problem.changed(noise=replace(noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0))
     curves = CurveSearch(easy)
     sets = {frozenset(): found.empty, found.best.candidates: found.best}
     fits = [easy.fit_candidates(chosen, fit.start if chosen else {}) for chosen, fit in sets.items()]
     tried = [one for fit in fits for one in curves.beside(fit)[:1] if one.form_of is None]
-    best = max(tried, key=lambda one: one.nats, default=None)
-    return best if best is not None and best.nats > _HINT else None
+    best = max(tried, key=found.log_posterior, default=None)
+    bare = max(map(found.log_posterior, fits))
+    return best if best is not None and found.log_posterior(best) > bare + _HINT else None
 
 
-def _log_density(made: Decision) -> float:
+def _log_density(problem: Problem, log_posterior: float) -> float:
     """Return the log posterior density of what acts, with its noise, up to a constant."""
-    volume = sum(
-        float(base_noise.whitener(drive, made.problem.noise).log_determinants.sum()) for drive in made.problem.drives
-    )
-    curve = likelier_curve(made.found)
-    return made.found.log_posterior(made.found.best if curve is None else curve) - 0.5 * volume
+    volume = sum(float(base_noise.whitener(drive, problem.noise).log_determinants.sum()) for drive in problem.drives)
+    return log_posterior - 0.5 * volume
+
+
+def _likeliest(found: SearchResult) -> Fit | SetWithCurve:
+    return likelier_curve(found) or found.best
+
+
+def _density_with(problem: Problem, curve: SetWithCurve, found: SearchResult) -> float:
+    """Return the same of a set with the best curve beside it in a problem, before other sets are sought there."""
+    fit, curves = problem.fit_candidates(curve.fit.candidates, curve.fit.start), CurveSearch(problem)
+    curves.closer(fit)
+    return max(_log_density(problem, found.log_posterior(one)) for one in curves.beside(fit)[:1])
 
 
 def likelier_curve(found: SearchResult) -> SetWithCurve | None:

@@ -53,6 +53,7 @@ class CurveSearch:
         """Take drives, and the fit by which they are simulated, None: nothing."""
         self._problem, self._about = problem, () if about is None else about.settings
         self._found: dict[frozenset[Candidate], list[SetWithCurve]] = {}
+        self._moved: dict[tuple[frozenset[Candidate], str], FloatArray] = {}
 
     @cached_property
     def _design(self) -> Design | None:
@@ -152,6 +153,9 @@ class CurveSearch:
 
     def _signals(self, fit: Fit, name: str) -> FloatArray:
         """Return what an effect of a fit does to the way, and to the turns, whitened, (rows, 2)."""
+        known = self._moved.get((fit.candidates, name))
+        if known is not None:
+            return known
         terms = zip(fit.terms, fit.values, strict=True)
         null = np.array([t.null if t.id == name and not t.shape else value for t, value in terms])
         parts = []
@@ -160,7 +164,8 @@ class CurveSearch:
             axes = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
             moved = ((here - there)[:, :, None] * axes).reshape(-1, 2)
             parts.append(self._problem.whitened(drive, moved))
-        return np.concatenate(parts)
+        self._moved[fit.candidates, name] = np.concatenate(parts)
+        return self._moved[fit.candidates, name]
 
     def _evidences(
         self, design: Design, beside: Beside, pull: FloatArray, shares: Sequence[tuple[float, float]]
