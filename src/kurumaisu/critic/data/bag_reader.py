@@ -19,6 +19,7 @@ from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.counters import Spans
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS
 from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
@@ -72,8 +73,8 @@ def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | N
             series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
-    series.update(_worked_out(path, meta, faults))
-    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+    lost = _work_out(path, meta, series, faults)
+    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan, aside=lost)
 
 
 def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faults: Faults) -> None:
@@ -85,17 +86,20 @@ def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faul
         faults.add(f"{path.name}: there is no topic {wanted[part]}; {words}")
 
 
-def _worked_out(path: Path, meta: Meta, faults: Faults) -> dict[str, Series | None]:
-    """Return the parts that no topic has as they are: the reference out of tf, and odometry out of wheels."""
-    series = {}
+def _work_out(path: Path, meta: Meta, series: dict[str, Series | None], faults: Faults) -> Spans:
+    """Add the parts that no topic has as they are: the reference out of tf, and odometry out of wheels.
+
+    Return the spans of time [s] in which the wheels do not tell what was driven.
+    """
+    lost: Spans = ()
     if meta.frames is not None:
         where = f"{path.name} tf {meta.frames[1]} in {meta.frames[0]}"
         t, rows = read_frame(path, *meta.frames)
         series["pose"] = clean(Table(where, t, rows, COLUMNS[:3], "transform", 1), faults)
     if meta.wheels is not None:
-        t, rows = read_wheels(path, meta.wheels)
+        t, rows, lost = read_wheels(path, meta.wheels, faults)
         series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
-    return series
+    return lost
 
 
 def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], FloatArray]:
