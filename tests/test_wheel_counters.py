@@ -9,6 +9,8 @@ from recordings import Bag
 
 from kurumaisu.critic import Meta, criticise_arrays
 from kurumaisu.critic.app.arrays import recording_of
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.counters import Counter, counted
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.params import robot_of
 from kurumaisu.settings import Section
@@ -207,3 +209,35 @@ def test_the_ticks_of_a_real_rover_are_left_as_they_are():
     rows = np.loadtxt(path)
     recording, run = odom_of(1e-6 * (rows[:, 0] - rows[0, 0]), rows[:, 2:4], meta(2000))
     assert (run.aside, [words for words in recording.problems if "wheels" in words]) == ((), [])
+
+
+def driven_at_random(rng):
+    """Return times with rows missing and late, the angle of a wheel there [rad], and its ticks in a turn."""
+    count, step = rng.integers(50, 600), rng.choice([0.01, 0.02, 0.05, 0.1, 0.3])
+    t = np.cumsum(step * np.where(rng.random(count) < 0.02, rng.uniform(2, 30, count), rng.uniform(0.3, 1.7, count)))
+    knots = np.arange(t[0], t[-1] + 3, rng.uniform(1, 4))
+    top = rng.choice([1, 5, 15])
+    rates = rng.uniform(-top, top, len(knots)) * (rng.random(len(knots)) < 0.8) + rng.choice([0, top / 2])
+    return t, np.cumsum(np.interp(t, knots, rates) * np.diff(t, prepend=t[0])), rng.choice([20, 100, 1000, 4096, 40000])
+
+
+@pytest.mark.parametrize("kind", [None, 8, 16, 32, "turn"])
+def test_no_step_of_any_counter_is_read_wrong(kind):
+    """If no step is above 0.3 of the range; few are left out, where rows are missing."""
+    rng = np.random.default_rng(1002)
+    steps = lost = 0
+    for _ in range(120):
+        t, angle, ticks = driven_at_random(rng)
+        counts = np.round(angle * ticks / (2 * np.pi))
+        size = {None: np.inf, "turn": float(ticks)}.get(kind) or 2.0**kind
+        if np.abs(np.diff(counts)).max() > 0.3 * size:
+            continue
+        given = counts if kind is None else (counts + rng.integers(size)) % size
+        given = np.where((given >= size / 2) & (rng.random() < 0.5), given - size, given)
+        turn = 2 * np.pi / ticks
+        read, spans = counted(Counter("left", turn, 0.1 * turn), t, given, Faults())
+        unknown = np.isin(t[:-1], [start for start, _ in spans])
+        np.testing.assert_allclose(np.diff(read)[~unknown], np.diff(counts)[~unknown], atol=1e-6)
+        steps, lost = steps + len(unknown), lost + unknown.sum()
+    assert steps > 5000
+    assert lost <= 0.003 * steps
