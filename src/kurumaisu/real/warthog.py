@@ -126,7 +126,8 @@ def _ways(poses: FloatArray) -> FloatArray:
     """Return the lengths [m], (n,), of arcs between poses (n + 1, 3) of x, y, heading."""
     x, y, yaw = poses.T
     course = 0.5 * (yaw[1:] + yaw[:-1])
-    return (np.diff(x) * np.cos(course) + np.diff(y) * np.sin(course)) / np.sinc(np.diff(yaw) / (2 * np.pi))
+    chords = np.diff(x) * np.cos(course) + np.diff(y) * np.sin(course)
+    return np.asarray(chords / np.sinc(np.diff(yaw) / (2 * np.pi)))
 
 
 def _cut(log: Log, at: FloatArray, radius: float, track: float) -> FloatArray:
@@ -134,7 +135,7 @@ def _cut(log: Log, at: FloatArray, radius: float, track: float) -> FloatArray:
     path = odometry(log, radius, track)
     poses = np.column_stack([np.interp(at, log.t, path[:, i]) for i in (1, 2, 3)])
     gone = np.r_[0.0, np.cumsum(0.5 * (path[1:, 4] + path[:-1, 4]) * np.diff(log.t))]
-    return np.diff(np.interp(at, log.t, gone)) - _ways(poses)
+    return np.asarray(np.diff(np.interp(at, log.t, gone)) - _ways(poses))
 
 
 def lateness(log: Log, poses: FloatArray, radius: float) -> FloatArray:
