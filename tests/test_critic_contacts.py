@@ -24,7 +24,7 @@ UNIX = 1.79e9  # [s] a time of this year
 def test_a_chair_that_is_held_for_three_seconds_is_told_with_time_and_place(seed, start):
     run = phased(np.random.default_rng(seed), held=HELD, start=start)
     out = masks.set_aside(recorded(run), MODEL)
-    ((first, end),) = out.runs[0].contacts
+    ((first, end),) = out.runs[0].aside
     assert first == pytest.approx(start + HELD[0], abs=0.5)
     assert start + HELD[1] < end < start + HELD[1] + 1.5
     (told,) = out.problems
@@ -50,7 +50,7 @@ def test_a_quantity_that_says_so_is_believed_whatever_the_chair_does():
     collision = Series(t, ((t >= 20.0) & (t < 22.0))[:, None].astype(float), ("collision",))
     run = replace(phased(np.random.default_rng(4), held=HELD), covariates={"collision": collision, "warmth": collision})
     out = masks.set_aside(recorded(run), MODEL)
-    ((first, end),) = out.runs[0].contacts
+    ((first, end),) = out.runs[0].aside
     assert 19.0 < first < 20.0
     assert 22.0 < end < 23.5
     assert set(out.runs[0].covariates) == {"warmth"}  # nothing follows it

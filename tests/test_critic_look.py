@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """critic look: what a recording holds, what meta.yaml could map, and what is missing, before anything is fitted."""
 
+import struct
+
+import mcap.writer
 import numpy as np
 import pytest
 from recordings import Bag, full_run, series, write_bag
 
 from kurumaisu.critic.app.look import look, main
+from kurumaisu.critic.bags.mcap_file import McapFile
+from kurumaisu.critic.bags.ros1 import Ros1Bag
+from kurumaisu.critic.bags.ros2 import Ros2Bag
 from kurumaisu.critic.data.csv_writer import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run
@@ -103,3 +109,64 @@ def test_what_cannot_be_read_is_an_error(tmp_path, capsys):
     (tmp_path / "drive.mcap").write_bytes(b"\x89MCAP0\r\n")
     assert main([str(tmp_path / "drive.mcap")]) == 1
     assert "drive.mcap: is not a complete MCAP file (mcap recover may help)" in capsys.readouterr().err
+
+
+def test_the_messages_are_read_once(drive, monkeypatch):
+    """And those of an MCAP file are not read to be counted: it states at its end how many there are."""
+    (drive.parent / "meta.yaml").write_text(f"{MAPPING}\n")
+    passes = []
+    for kind in (McapFile, Ros1Bag, Ros2Bag):
+        original = kind.messages
+        monkeypatch.setattr(
+            kind, "messages", lambda *given, own=original, **how: passes.append(1) or own(*given, **how)
+        )
+    records = McapFile._records
+    monkeypatch.setattr(McapFile, "_records", lambda self: passes.append(0) or records(self))
+    assert "200" in next(line for line in look(drive) if "/robot/cmd_vel" in line)
+    assert passes == ([1, 0] if drive.suffix == ".mcap" else [1])
+
+
+def test_a_piece_of_a_drive_is_looked_at(drive, capsys):
+    (drive.parent / "meta.yaml").write_text(f"{MAPPING}\n")
+    assert main([str(drive), "--from", "+5", "--to", "+15"]) == 0
+    told = capsys.readouterr().out
+    assert "base: 10 s of motion" in told
+    assert "rows of command are left out, as asked" in told
+    assert main([str(drive), "--from", "100"]) == 1
+    assert "nothing is left from 100" in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        main([str(drive), "--to", "soon"])
+    assert "must be a time in seconds" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"use_statistics": False},
+        {"repeat_channels": False},
+        {"enable_crcs": False},
+        {"use_statistics": False, "repeat_channels": False, "repeat_schemas": False, "use_summary_offsets": False},
+    ],
+)
+def test_an_mcap_file_that_states_less_is_counted(tmp_path, monkeypatch, how):
+    whole = mcap.writer.Writer
+    monkeypatch.setattr(mcap.writer, "Writer", lambda *given, **more: whole(*given, **more, **how))
+    write_bag(tmp_path / "drive.mcap", full_run(), ros=2)
+    assert " 100 " in next(line for line in look(tmp_path / "drive.mcap") if "/odom" in line)
+
+
+def test_damage_to_what_an_mcap_file_states_is_noticed(tmp_path):
+    """Any bit of its end: the counts are those of the messages, or the file is refused by name."""
+    write_bag(tmp_path / "drive.mcap", full_run(), ros=2)
+    data = (tmp_path / "drive.mcap").read_bytes()
+    (start,) = struct.unpack("<Q", data[-28:-20])
+    whole = [line for line in look(tmp_path / "drive.mcap") if "_msgs/" in line]
+    rng = np.random.default_rng(1000)
+    for at in rng.integers(start, len(data), 20):
+        damaged = bytearray(data)
+        damaged[at] ^= 1 << rng.integers(8)
+        (tmp_path / "drive.mcap").write_bytes(damaged)
+        try:
+            assert [line for line in look(tmp_path / "drive.mcap") if "_msgs/" in line] == whole
+        except Error as error:
+            assert "drive.mcap" in str(error)  # noqa: PT017

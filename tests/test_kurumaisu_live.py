@@ -2,6 +2,7 @@
 """kurumaisu sim --viewer: a page drives the simulated chair, stops it, and moves what there is."""
 
 import math
+import os
 import re
 import signal
 import subprocess
@@ -19,16 +20,18 @@ from kurumaisu.sim.settings import load_dynamics
 from kurumaisu.viewer import Hub, Server
 from kurumaisu.world import load_world
 
+MODEL = shipped("launch/md100.yaml")
+
 
 @pytest.fixture
 def live():
     """A page that may command a chair in the arena."""
-    model = load_model(shipped("launch/md100.yaml"))
+    model = load_model(MODEL)
     simulator = ChairSimulator(
         model, load_world(shipped("worlds/arena.world")), load_dynamics(shipped("launch/physical.yaml"))
     )
     hub, how = Hub(), viewer_settings()
-    chair = LiveChair(hub, "arena", simulator, model, Stick(0.5, 0.8, 0.5), base_limits(), how.rate)
+    chair = LiveChair(hub, "arena", simulator, model, MODEL, Stick(0.5, 0.8, 0.5), base_limits(), how.rate)
     server = Server(how, hub, chair, control=True)
     server.start()
     chair.start()
@@ -77,6 +80,32 @@ def test_pause_step_speed(live):
     assert not live.ask("speed", value=-1.0)["ok"]
 
 
+def acting(page):
+    """Return the effects that the page is shown as acting, with their values."""
+    groups = page.newest["effects"]["groups"]
+    return {one["id"]: {p["name"]: p["value"] for p in one["parameters"]} for one in groups if one["enabled"]}
+
+
+def test_effects_are_shown_switched_and_saved(live, tmp_path):
+    live.wait(lambda: "effects" in live.newest, "effects")
+    own = acting(live)
+    assert set(own) == {one.id for one in load_model(MODEL).effects}
+    answer = live.ask("effect", effect="base.gain_v", enabled=True, values={"gain": 0.5})
+    assert answer["ok"], answer
+    live.wait(lambda: acting(live) == own | {"base.gain_v": {"gain": 0.5}}, "a gain")
+    for _ in range(5):
+        assert live.ask("drive", v=0.4, w=0.0)["ok"]
+        wait(live, lambda now: now["commanded"] == [0.4, 0.0], "the command")
+    wait(live, lambda now: now["v"] == pytest.approx(0.6), "half as much again")
+    (tmp_path / "model.yaml").write_text(live.ask("save_model")["result"])
+    assert {one.id for one in load_model(tmp_path / "model.yaml").effects} == {*own, "base.gain_v"}
+    assert live.ask("effect", effect="base.gain_v", enabled=False, values={})["ok"]
+    live.wait(lambda: acting(live) == own, "no gain")
+    for wrong in ({"effect": "base.gian_v", "values": {}}, {"effect": "base.gain_v", "values": {"gain": 1e9}}):
+        assert not live.ask("effect", enabled=True, **wrong)["ok"]
+    assert acting(live) == own
+
+
 def test_bodies_are_moved_but_no_walls(live):
     live.wait(lambda: "world" in live.newest and "state" in live.newest, "a world")
     world = live.newest["world"]
@@ -94,8 +123,10 @@ def test_bodies_are_moved_but_no_walls(live):
 
 
 def test_the_program_prints_an_address_and_ends_at_a_signal():
+    """Whichever thread gets it: NumPy's library starts some of its own."""
     command = "import sys; from kurumaisu.programs.main import main; sys.exit(main(['sim', '--viewer', '--port', '0']))"
-    with subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.PIPE, text=True) as process:
+    threads = os.environ | {"OPENBLAS_NUM_THREADS": "2"}
+    with subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.PIPE, text=True, env=threads) as process:
         assert "MD-100" in process.stdout.readline()
         assert re.match(r"open http://127\.0\.0\.1:\d+/#token=", process.stdout.readline())
         process.send_signal(signal.SIGTERM)

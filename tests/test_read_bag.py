@@ -119,6 +119,19 @@ def test_stamped_rows_that_repeat_are_copies_as_before(tmp_path):
     assert any("repeats its rows" in words for words in read_recording(tmp_path / "drive.bag").invalid)
 
 
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_a_stamp_of_0_is_one_where_a_clock_begins_there_and_else_was_not_set(tmp_path, start):
+    bag = Bag(tmp_path / "drive.bag")
+    for n in range(20):
+        stamp = start + 0.1 * n if n else 0.0
+        bag.write("/cmd_vel", bag.twist_stamped(stamp, 0.5, 0.1), start + 0.1 * n + 0.02)
+        bag.write("/odom", bag.odometry(stamp, (0.1 * n, 0.0, 0.0), 0.5, 0.1), start + 0.1 * n + 0.02)
+    bag.writer.close()
+    (run,) = read_recording(tmp_path).runs
+    for part in (run.command, run.odom):
+        np.testing.assert_allclose(part.t[:2], [start if start == 0.0 else start + 0.02, start + 0.1], rtol=1e-15)
+
+
 def test_topics_recorded_by_relative_names_count_too(tmp_path):
     """As `rosbag record scan odom` writes them."""
     run = full_run()

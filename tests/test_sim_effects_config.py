@@ -9,6 +9,7 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.params import EffectSetting
 from kurumaisu.ros.sim import effects_config as config
+from kurumaisu.viewer.effects import listed
 
 LAG = EffectSetting("base.lag_w", {"tau": 0.4})
 LIGHT = EffectSetting("laser.crosstalk", {"probability": 0.1, "width": 0.2, "drift": -0.3, "reach": 5.0})
@@ -72,5 +73,5 @@ def test_a_request_is_sifted(request_, changes, complaint):
 
 @pytest.mark.parametrize("settings", [(), (LAG,), (LAG, LIGHT)])
 def test_the_list_is_a_file_of_effects(settings):
-    read = yaml.safe_load(config.listed(settings))
+    read = yaml.safe_load(listed(settings))
     assert read == {"effects": [{"id": one.id, "parameters": one.parameters} for one in settings]}

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from kurumaisu.sim.robots.machinery import Machinery
 from kurumaisu.sim.robots.scenery import Piece, bounds, scenery
 from kurumaisu.types import FloatArray
 from kurumaisu.viewer import Body, Fan, Hub, Outcome, State, World
+from kurumaisu.viewer.effects import Switches
 
 _GLANCE = 0.1  # [s] of a pause, after which it is seen whether all is to end
 
@@ -41,15 +43,24 @@ class LiveChair:
     """Simulates in a thread of its own, and shows it in a hub. Nothing happens before start."""
 
     mode = "sim"
-    abilities = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose", "drive"})
+    abilities = frozenset({"pause", "step", "speed", "reset", "seed", "set_pose", "drive", "effect", "save_model"})
 
     def __init__(
-        self, hub: Hub, title: str, simulator: ChairSimulator, model: Model, stick: Stick, limits: Limits, rate: float
+        self,
+        hub: Hub,
+        title: str,
+        simulator: ChairSimulator,
+        model: Model,
+        file: Path,
+        stick: Stick,
+        limits: Limits,
+        rate: float,
     ) -> None:
-        """limits: the base's own; rate [Hz] of moments that are shown, by the clock."""
+        """file: the model's; limits: the base's own; rate [Hz] of moments that are shown, by the clock."""
         self.title = title
         self.limits: Mapping[str, float] | None = {"v": stick.v, "w": stick.w}
-        self._hub, self._simulator, self._model = hub, simulator, model
+        self._hub, self._simulator, self._model, self._file = hub, simulator, model, file
+        self._switches = Switches()
         self._stick, self._base, self._period = stick, limits, 1 / rate
         self._asked, self._heard = np.zeros(2), -np.inf  # v [m/s], w [rad/s], and when, by the clock [s]
         self._commanded, self._volts = np.zeros(2), (0.0, 0.0)
@@ -63,6 +74,7 @@ class LiveChair:
         """Begin to simulate."""
         self._seen = self._simulator.reset(self._simulator.seed)
         self._show()
+        self._hub.effects(self._switches.set(self._model.effects))
         self._thread.start()
 
     def close(self) -> None:
@@ -86,6 +98,8 @@ class LiveChair:
             "reset": self._reset,
             "seed": self._reset,
             "set_pose": self._put,
+            "effect": self._switch,
+            "save_model": lambda: self._switches.model(self._file),
         }
         try:
             outcome: Outcome = self._requests.ask(lambda: obey[name](**arguments))
@@ -130,6 +144,17 @@ class LiveChair:
         self._simulator.set_pose(body, [x, y, float(piece.pose[2]), yaw])
         self._show()
         return Outcome(f"{piece.name} moved")
+
+    def _switch(self, effect: str, enabled: bool, values: Mapping[str, float]) -> Outcome:
+        setting = self._switches.asked(effect, values)
+        acting = {one.id: one for one in self._switches.acting} | {effect: setting}
+        if not enabled:
+            del acting[effect]
+        self._simulator.switch(tuple(acting.values()))
+        self._switches.remember(setting)
+        self._hub.effects(self._switches.set(tuple(acting.values())))
+        self._show()
+        return Outcome(f"{effect} {'is on' if enabled else 'is off'}")
 
     def _run(self) -> None:
         while not self._closed:

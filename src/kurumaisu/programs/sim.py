@@ -67,7 +67,7 @@ def _serve(options: argparse.Namespace) -> None:
     drive = settings.load(shipped("launch/viewer.yaml")).section("drive")
     stick = Stick(*(drive.number(name, above=0) for name in ("v", "w", "dead_man")))
     hub = Hub()
-    chair = LiveChair(hub, options.world.stem, simulator, model, stick, manner().limits, how.rate)
+    chair = LiveChair(hub, options.world.stem, simulator, model, options.model, stick, manner().limits, how.rate)
     stay(Opened(chair, Server(how, hub, chair, control=True), f"{model.name} in {options.world}"))
 
 

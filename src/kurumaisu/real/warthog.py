@@ -20,6 +20,7 @@ TRACK = 1.50  # [m] between the wheels, nominal
 _COUNTS = "calib"  # state in which commands mean something
 _GAP, _DRAINED = 0.16, 1.0  # [s] between poses that come as they are measured; after a longer one, until none waits
 _WINDOW = 2.0  # [s] over which wheels and ground are compared by hand
+_ROUNDS = 5  # of working out how much of a way its chords cut, by the wheels that come of it
 
 
 @dataclass(frozen=True)
@@ -93,28 +94,48 @@ def between(table: FloatArray, start: float, end: float) -> FloatArray:
 
 
 def wheels_against_ground(log: Log, start: float, end: float) -> tuple[float, float, str]:
-    """Return the effective radius and track [m] of a stretch, by least squares over windows, and both in words."""
+    """Return the effective radius and track [m] of a stretch, by least squares over windows, and both in words.
+
+    Poses come rarely at times, and a chord cuts the bends of the way between two of them: see _cut.
+    """
     poses = between(log.pose, start, end)
     kept = [0]
     for i in range(len(poses)):
         kept += [i] if poses[i, 0] - poses[kept[-1], 0] >= _WINDOW else []
-    at, x, y, yaw = poses[kept].T
+    at, ahead, turn = poses[kept, 0], _ways(poses[kept, 1:]), np.diff(poses[kept, 3])
     turned = np.vstack([np.zeros(2), np.cumsum(0.5 * (log.wheels[1:] + log.wheels[:-1]) * np.diff(log.t)[:, None], 0)])
     spun = np.diff(np.column_stack([np.interp(at, log.t, turned[:, i]) for i in range(2)]), axis=0)
-    turn, course = np.diff(yaw), 0.5 * (yaw[1:] + yaw[:-1])
-    way = (np.diff(x) * np.cos(course) + np.diff(y) * np.sin(course)) / np.sinc(turn / (2 * np.pi))
     moving = np.abs(spun).sum(axis=1) > 0.5
     mean, difference = spun.mean(axis=1)[moving], np.diff(spun, axis=1)[moving, 0]
-    ahead = least_squares(np.column_stack([mean, difference]), way[moving])
     around = least_squares(np.column_stack([difference, mean]), turn[moving])
-    radius, track = float(ahead.at[0]), float(ahead.at[0] / around.at[0])
-    error = track * np.hypot(ahead.sd[0] / ahead.at[0], around.sd[0] / around.at[0])
+    radius, track = RADIUS, TRACK
+    for _ in range(_ROUNDS):
+        whole = ahead[moving] + _cut(log, at, radius, track)[moving]
+        along = least_squares(np.column_stack([mean, difference]), whole)
+        radius, track = float(along.at[0]), float(along.at[0] / around.at[0])
+    error = track * np.hypot(along.sd[0] / along.at[0], around.sd[0] / around.at[0])
     words = (
-        f"{moving.sum()} stretches of {_WINDOW:g} s and more: effective radius {ahead.told(0)} m (nominal {RADIUS}), "
+        f"{moving.sum()} stretches of {_WINDOW:g} s and more: effective radius {along.told(0)} m (nominal {RADIUS}), "
         f"apparent track {track:.3f} +- {error:.3f} m (nominal {TRACK}): turns are {around.at[0] * TRACK / RADIUS:.3f} "
         f"of what nominal wheels say"
     )
     return radius, track, words
+
+
+def _ways(poses: FloatArray) -> FloatArray:
+    """Return the lengths [m], (n,), of arcs between poses (n + 1, 3) of x, y, heading."""
+    x, y, yaw = poses.T
+    course = 0.5 * (yaw[1:] + yaw[:-1])
+    chords = np.diff(x) * np.cos(course) + np.diff(y) * np.sin(course)
+    return np.asarray(chords / np.sinc(np.diff(yaw) / (2 * np.pi)))
+
+
+def _cut(log: Log, at: FloatArray, radius: float, track: float) -> FloatArray:
+    """Return by how much the ways of a robot with such wheels are longer than arcs between its poses at times [m]."""
+    path = odometry(log, radius, track)
+    poses = np.column_stack([np.interp(at, log.t, path[:, i]) for i in (1, 2, 3)])
+    gone = np.r_[0.0, np.cumsum(0.5 * (path[1:, 4] + path[:-1, 4]) * np.diff(log.t))]
+    return np.asarray(np.diff(np.interp(at, log.t, gone)) - _ways(poses))
 
 
 def lateness(log: Log, poses: FloatArray, radius: float) -> FloatArray:

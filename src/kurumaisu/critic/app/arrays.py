@@ -85,8 +85,8 @@ def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None,
             parts[part] = series
         elif series is not None:
             covariates[part] = series
-    with_wheels(name, parts, robot)
-    return completed(replace(run_of_parts(name, parts, covariates), queries=queries), hold, faults)
+    lost = with_wheels(name, name, parts, robot, faults)
+    return completed(replace(run_of_parts(name, parts, covariates), queries=queries, aside=lost), hold, faults)
 
 
 def _rows(where: str, given: ArrayLike) -> FloatArray:

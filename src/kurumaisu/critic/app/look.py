@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +12,16 @@ import numpy as np
 
 from kurumaisu import program
 from kurumaisu.critic.app.display import cells, printable
-from kurumaisu.critic.app.options import name_list
+from kurumaisu.critic.app.options import add_span, name_list
 from kurumaisu.critic.bags.containers import is_bag
 from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
-from kurumaisu.critic.bags.topics import read_topics
-from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, resolve
+from kurumaisu.critic.bags.topics import Topic
+from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, read_bag_topics, resolve
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run
+from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
 from kurumaisu.critic.data.wheel_reader import JOINTS
@@ -63,23 +64,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print what there is; return 0, or 1 for what cannot be read or used."""
     options = _parser().parse_args(arguments)
     try:
-        for line in look(options.recording, options.runs):
+        for line in look(options.recording, options.runs, Excerpt(options.start, options.stop)):
             print(printable(line), flush=True)
     except Error as error:
         return failed("critic look", error)
     return 0
 
 
-def look(path: Path, wanted: Sequence[str] = ()) -> Iterator[str]:
-    """Yield lines for people about the runs of a recording. Raise Error for what cannot be read."""
+def look(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Iterator[str]:
+    """Yield lines for people about the runs of a recording; excerpt: what of each is used.
+
+    Raise Error for what cannot be read.
+    """
     meta = meta_of(path)
     faults = Faults()
     runs = []
     for source in chosen(sources(path), wanted):
         yield f"{source}:"
+        topics = None
         if is_bag(source) or is_split(source):
-            yield from _topics(source, meta)
-        run, mount = read_run(source, meta, faults)
+            topics = yield from _topics(source, meta)
+        run, mount = read_run(source, meta, faults, topics=topics)
+        run = cut(run, excerpt, faults)
         check_run(run, meta.laser or mount, faults)
         runs.append(run)
         yield from _parts(run)
@@ -137,23 +143,24 @@ def _moving(runs: Sequence[Run]) -> float:
     return total
 
 
-def _topics(source: Path, meta: Meta) -> Iterator[str]:
-    """Yield the table of a bag's topics, and what meta.yaml could map."""
+def _topics(source: Path, meta: Meta) -> Generator[str, None, dict[str, Topic]]:
+    """Yield the table of a bag's topics, and what meta.yaml could map; return what was read of them, at once."""
     found = survey(source)
     roles = {topic: part for part, topic in resolve(meta.topics).items()}
-    useful = {topic.name for topic in found if topic.serves or topic.name in roles}
-    times = {
-        name: Times(topic.times(), topic.lateness())
-        for name, topic in read_topics(source, dict.fromkeys(useful, lambda _: lambda _: ())).items()
-    }
-    rows = [("topic", "type", "messages", "rate", "gaps", "clock", "serves as")]
-    for topic in found:
-        told = times[topic.name].told if topic.name in times else (f"{topic.rate:.3g} Hz", "", "")
-        could = [f"could be {TOPICS[part]}" for part in topic.serves]
-        role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could) or _note(topic.type)
-        rows.append((topic.name, topic.type, str(topic.count), *told, role))
-    yield from _table(rows)
-    yield from (f"  meta.yaml could say  {words}" for words in mappings(found, meta))
+    topics: dict[str, Topic] = {}
+    try:
+        topics = read_bag_topics(source, meta, also=[topic.name for topic in found if topic.serves])
+    finally:  # what there is helps where that cannot be read
+        rows = [("topic", "type", "messages", "rate", "gaps", "clock", "serves as")]
+        for topic in found:
+            read = topics.get(topic.name)
+            told = Times(read.times(), read.lateness()).told if read else (f"{topic.rate:.3g} Hz", "", "")
+            could = [f"could be {TOPICS[part]}" for part in topic.serves]
+            role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could) or _note(topic.type)
+            rows.append((topic.name, topic.type, str(topic.count), *told, role))
+        yield from _table(rows)
+        yield from (f"  meta.yaml could say  {words}" for words in mappings(found, meta))
+    return topics
 
 
 def _note(kind: str) -> str:
@@ -186,4 +193,5 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("recording", type=Path, metavar="RECORDING", help=what)
     words = "only these runs; patterns like drive_* are allowed"
     parser.add_argument("--runs", type=name_list, default=(), metavar="A,B", help=words)
+    add_span(parser)
     return parser

@@ -64,15 +64,7 @@ def _parser() -> argparse.ArgumentParser:
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="output folder (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
-    since = "12.5 as in tables and messages, or +12.5 since each drive began"
-    add(
-        "--from",
-        dest="start",
-        type=_argument(excerpt.moment),
-        metavar="T",
-        help=f"use drives from this time on [s]: {since}",
-    )
-    add("--to", dest="stop", type=_argument(excerpt.moment), metavar="T", help="use drives until this time [s]")
+    add_span(parser)
     rows = (
         "leave out rows of a part (pose, odom, scan, command, voltage), or of all that was measured, between two times"
     )
@@ -97,6 +89,21 @@ def _parser() -> argparse.ArgumentParser:
     add("-q", "--quiet", action="store_true", help="show no progress")
     add("--version", action="version", version=f"critic {version()}")
     return parser
+
+
+def add_span(parser: argparse.ArgumentParser) -> None:
+    """Add --from and --to, of drives."""
+    since = "12.5 as in tables and messages, or +12.5 since each drive began"
+    parser.add_argument(
+        "--from",
+        dest="start",
+        type=_argument(excerpt.moment),
+        metavar="T",
+        help=f"use drives from this time on [s]: {since}",
+    )
+    parser.add_argument(
+        "--to", dest="stop", type=_argument(excerpt.moment), metavar="T", help="use drives until this time [s]"
+    )
 
 
 def add_effects(parser: argparse.ArgumentParser) -> None:

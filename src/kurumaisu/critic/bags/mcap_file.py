@@ -4,14 +4,13 @@
 from __future__ import annotations
 
 import zlib
-from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO
 
-from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.interfaces import (
     Connection,
@@ -24,6 +23,7 @@ from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
 from rosbags.typesys.msg import normalize_msgtype
 
 from kurumaisu.critic.bags.limits import LATEST, MOST_UNPACKED, UNPACKERS, Unpacker
+from kurumaisu.critic.bags.mcap_summary import Contents, stated_contents
 from kurumaisu.errors import Error, told
 
 _FORMATS = {
@@ -36,7 +36,7 @@ _ROS1, _ROS2 = "ros1", "cdr"
 
 
 class McapFile:
-    """Reads from the beginning to the end, so that a file whose index was never written is found to be cut."""
+    """Reads messages from the beginning to the end, so that a file whose end was never written is found to be cut."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -53,21 +53,13 @@ class McapFile:
 
     def open(self) -> None:
         """Find the channels; some may hold messages that are none of ROS."""
-        schemas: dict[int, Schema] = {}
-        channels: dict[int, Channel] = {}
-        counts: Counter[int] = Counter()
-        for record in self._records():
-            if isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                channels[record.id] = record
-            elif isinstance(record, Message):
-                counts[record.channel_id] += 1
-                self.start_time = min(self.start_time, record.log_time)
-                self.end_time = max(self.end_time, record.log_time + 1)
+        contents = stated_contents(self.path) or self._contents()
+        counts = contents.counts
+        if sum(counts.values()):
+            self.start_time, self.end_time = contents.first, contents.last + 1
         self.connections = [
-            self._connection(channel, schemas.get(channel.schema_id), counts[channel.id])
-            for channel in channels.values()
+            self._connection(channel, contents.schemas.get(channel.schema_id), counts.get(channel.id, 0))
+            for channel in contents.channels.values()
         ]
 
     def close(self) -> None:
@@ -91,9 +83,33 @@ class McapFile:
         """Yield connection, time of logging [ns] and data, in the order of the file, from start until before stop."""
         wanted = {connection.id: connection for connection in connections}
         first, last = start or 0, LATEST if stop is None else stop
-        for record in self._records():
+        known = {connection.id for connection in self.connections}
+        for record in self._data():
+            if isinstance(record, Channel) and record.id not in known:
+                raise Error(f"{self.path}: what it states at its end lacks {told(record.topic)}")
             if isinstance(record, Message) and record.channel_id in wanted and first <= record.log_time < last:
                 yield wanted[record.channel_id], record.log_time, record.data
+
+    def _contents(self) -> Contents:
+        """Read all to find what there is."""
+        found = Contents(first=LATEST)
+        for record in self._data():
+            if isinstance(record, Schema):
+                found.schemas[record.id] = record
+            elif isinstance(record, Channel):
+                found.channels[record.id] = record
+            elif isinstance(record, Message):
+                found.counts[record.channel_id] = found.counts.get(record.channel_id, 0) + 1
+                found.first, found.last = min(found.first, record.log_time), max(found.last, record.log_time)
+        return found
+
+    def _data(self) -> Iterator[McapRecord]:
+        """Yield the records up to the end of the data, and read on to the end of the file, to see that it is there."""
+        ended = False
+        for record in self._records():
+            ended = ended or isinstance(record, DataEnd)
+            if not ended:
+                yield record
 
     def _records(self) -> Iterator[McapRecord]:
         size = self.path.stat().st_size

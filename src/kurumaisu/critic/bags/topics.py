@@ -17,10 +17,11 @@ from kurumaisu.critic.bags.decoding import decoder, shown
 from kurumaisu.critic.bags.messages import ScanRow
 from kurumaisu.critic.bags.parts import parts_of
 from kurumaisu.errors import Error
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 Row = tuple[float, ...] | dict[str, float] | ScanRow
 Convert = Callable[[Any], Row | None]  # None: a message that says nothing of what is wanted
+_BEGINNING = 1e9  # [ns] within which a message was received of those that a clock stamped when it began
 Wanted = Mapping[str, Callable[[str], Convert]]
 
 
@@ -63,8 +64,15 @@ class Topic:
         """Return the stamp of each message, or else when it was received, in the order of receipt, (n,) [s]."""
         stamps, received = np.asarray(self.stamps), np.asarray(self.received)
         # Integers divide to the float nearest to the decimal number of seconds, the one CSV reads.
-        times = [int(ns) / 1_000_000_000 for ns in np.where(stamps != 0, stamps, received)[self.order()]]
+        times = [int(ns) / 1_000_000_000 for ns in np.where(self._stamped(), stamps, received)[self.order()]]
         return np.array(times, dtype=np.float64)
+
+    def _stamped(self) -> BoolArray:
+        """Return which messages have a stamp, (n,). One of 0 is none, unless a simulation's clock begins there."""
+        stamps, received = np.asarray(self.stamps), np.asarray(self.received)
+        late = self.lateness()
+        begins = False if late is None else np.abs(received - 1e9 * late) < _BEGINNING
+        return np.asarray((stamps != 0) | begins, dtype=np.bool_)
 
     def lateness(self) -> float | None:
         """Return the median of receipt minus stamp [s], None when nothing is stamped."""

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -19,6 +19,7 @@ from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.counters import Spans
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS
 from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
@@ -45,19 +46,25 @@ PutAside = Callable[[FloatArray, FloatArray | None], int]
 CLOCK_TOLERANCE = 1.0
 
 
-def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None) -> Run:
+def read_bag_run(
+    path: Path,
+    meta: Meta,
+    faults: Faults,
+    put_aside: PutAside | None = None,
+    topics: Mapping[str, Topic] | None = None,
+) -> Run:
     """Read the topics of a bag that meta names, by default name or by name of a covariate, its frames and its wheels.
 
     put_aside: takes the ranges and the intensities of each scan and returns their number, which the run's scan then has
-    for its only column; None: it has the ranges.
+    for its only column; None: it has the ranges. topics: what read_bag_topics returned, if it was called before.
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
     wanted = _own(meta)
-    shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
-    if shared:
-        raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
-    found = _found(path, wanted, put_aside)
+    read = read_bag_topics(path, meta, put_aside) if topics is None else topics
+    found = {part: read[topic] for part, topic in wanted.items() if topic in read}
+    if "command" not in found and SCRIPTED in read:
+        found["command"] = read[SCRIPTED]
     _name_absent(path, sorted(set(_parts(meta.topics)) & set(wanted) - set(found)), wanted, faults)
     _check_clocks(path.name, found, faults)
     series: dict[str, Series | None] = {}
@@ -72,8 +79,8 @@ def read_bag_run(path: Path, meta: Meta, faults: Faults, put_aside: PutAside | N
             series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
-    series.update(_worked_out(path, meta, faults))
-    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan)
+    lost = _work_out(path, meta, series, faults)
+    return replace(run_of_parts(bag_name(path), series, covariates), fan=fan, aside=lost)
 
 
 def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faults: Faults) -> None:
@@ -85,17 +92,20 @@ def _name_absent(path: Path, absent: Sequence[str], wanted: dict[str, str], faul
         faults.add(f"{path.name}: there is no topic {wanted[part]}; {words}")
 
 
-def _worked_out(path: Path, meta: Meta, faults: Faults) -> dict[str, Series | None]:
-    """Return the parts that no topic has as they are: the reference out of tf, and odometry out of wheels."""
-    series = {}
+def _work_out(path: Path, meta: Meta, series: dict[str, Series | None], faults: Faults) -> Spans:
+    """Add the parts that no topic has as they are: the reference out of tf, and odometry out of wheels.
+
+    Return the spans of time [s] in which the wheels do not tell what was driven.
+    """
+    lost: Spans = ()
     if meta.frames is not None:
         where = f"{path.name} tf {meta.frames[1]} in {meta.frames[0]}"
         t, rows = read_frame(path, *meta.frames)
         series["pose"] = clean(Table(where, t, rows, COLUMNS[:3], "transform", 1), faults)
     if meta.wheels is not None:
-        t, rows = read_wheels(path, meta.wheels)
+        t, rows, lost = read_wheels(path, meta.wheels, faults)
         series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
-    return series
+    return lost
 
 
 def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], FloatArray]:
@@ -126,8 +136,17 @@ def _east_and_north(fixes: FloatArray) -> FloatArray:
     return np.stack([east, north], axis=1)
 
 
-def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> dict[str, Topic]:
-    """Return the topics that are in the bag, by part."""
+def read_bag_topics(
+    path: Path, meta: Meta, put_aside: PutAside | None = None, also: Collection[str] = ()
+) -> dict[str, Topic]:
+    """Read the topics of a bag that meta names, and of others only their times, by absolute topic.
+
+    put_aside: as read_bag_run has it. Raise Error naming file, topic and type for what cannot be read.
+    """
+    wanted = _own(meta)
+    shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
+    if shared:
+        raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
 
     def converter(part: str, kind: str) -> Convert:
         convert = messages.converter(part, kind)
@@ -138,13 +157,12 @@ def _found(path: Path, wanted: dict[str, str], put_aside: PutAside | None) -> di
             return lambda message: _aside(convert(message), put_aside)
         return convert
 
-    parts = {topic: part for part, topic in wanted.items()}
-    found = read_topics(path, {topic: partial(converter, part) for topic, part in parts.items()})
-    if wanted["command"] not in found:
-        scripted = read_topics(path, {SCRIPTED: partial(converter, "command")})
-        if SCRIPTED in scripted:
-            found[wanted["command"]] = scripted[SCRIPTED]
-    return {part: found[topic] for part, topic in wanted.items() if topic in found}
+    def of_script(kind: str) -> Convert:
+        return messages.converter("command", kind) or (lambda _: None)
+
+    times = dict.fromkeys(also, lambda _: lambda _: ())
+    parts = {topic: partial(converter, part) for part, topic in wanted.items()}
+    return read_topics(path, {**times, SCRIPTED: of_script, **parts})
 
 
 def _aside(row: ScanRow, put_aside: PutAside) -> ScanRow:

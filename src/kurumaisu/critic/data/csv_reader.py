@@ -75,9 +75,10 @@ def read_csv_run(folder: Path, name: str, faults: Faults, robot: Robot | None = 
                 raise Error(f"{path}: there is a {part}.csv, too: one or the other")
             t, rows = read_tum(path)
             parts[part] = clean(Table(f"{name}/{path.name}", t, rows, ("x", "y", "theta"), "row", 1), faults)
-    with_wheels(str(folder), parts, robot)
+    lost = with_wheels(str(folder), name, parts, robot, faults)
     query = folder / f"{QUERY}.csv"
-    return replace(run_of_parts(name, parts, covariates), queries=read_queries(query) if query.exists() else None)
+    queries = read_queries(query) if query.exists() else None
+    return replace(run_of_parts(name, parts, covariates), queries=queries, aside=lost)
 
 
 def read_queries(path: Path) -> FloatArray:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import geometry
+from kurumaisu.critic.data.clean import Faults
+from kurumaisu.critic.data.counters import Counter, Spans, counted
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 from kurumaisu.params import Robot
@@ -41,28 +43,52 @@ class Wheels:
         left, right = self.radius * wheels.T
         return np.stack([(left + right) / 2, (right - left) / self.track], axis=1)
 
+    def counter(self, where: str) -> Counter:
+        """Return the counter of a wheel that is read there."""
+        return Counter(where, self.turn, self.turn * self.radius)
 
-def with_wheels(where: str, parts: dict[str, Series | None], robot: Robot | None) -> None:
+    def odometry(self, t: FloatArray, counts: FloatArray, lost: Spans) -> FloatArray:
+        """Return rows (n, 5) of x, y, theta, v, w, from 0, of what both sides' counters say (n, 2) at times (n,) [s].
+
+        lost: spans of time [s] in which it is not known what was driven: nothing, then.
+        """
+        steps = np.diff(counts, axis=0)
+        for start, stop in lost:
+            steps[(t[1:] > start) & (t[:-1] < stop)] = 0.0
+        poses = along(self.motion(self.turn * steps))
+        return np.column_stack([poses, rates_between(t, poses)])
+
+
+def with_wheels(where: str, name: str, parts: dict[str, Series | None], robot: Robot | None, faults: Faults) -> Spans:
     """Put the odometry in place of tables of wheels: of angles [rad] or ticks, or of rates [rad/s].
 
+    where, name: of the run, in errors and in faults. Return the spans [s] in which it is not known what was driven.
     Raise Error naming where, if there is other odometry, or nothing says how large the wheels are.
     """
+    lost: Spans = ()
     given = [name for name in WHEEL_TABLES if parts.get(name) is not None]
-    for name in given:
+    for each in given:
         if len(given) > 1 or "odom" in parts:
             raise Error(
-                f"{where}/{name}: is odometry, and so is {'odom' if 'odom' in parts else given[1]}: one of them"
+                f"{where}/{each}: is odometry, and so is {'odom' if 'odom' in parts else given[1]}: one of them"
             )
         if robot is None or robot.radius is None or robot.track is None:
-            raise Error(f"{where}/{name}: how large the wheels are is not said: `robot` in meta.yaml, radius and track")
-        table = parts.pop(name)
+            raise Error(f"{where}/{each}: how large the wheels are is not said: `robot` in meta.yaml, radius and track")
+        table = parts.pop(each)
         assert table is not None
-        angles = name == WHEEL_TABLES[0]
-        wheels = Wheels((), (), robot.radius, robot.track, ticks_per_turn=robot.ticks_per_turn if angles else None)
-        moved = wheels.motion(wheels.turn * (np.diff(table.values, axis=0) if angles else table.values))
-        poses = along(moved) if angles else driven_by(table.t, moved)
-        rates = rates_between(table.t, poses) if angles else moved
-        parts["odom"] = Series(table.t, np.column_stack([poses, rates]), COLUMNS)
+        if each == WHEEL_TABLES[0]:
+            wheels = Wheels(("left",), ("right",), robot.radius, robot.track, ticks_per_turn=robot.ticks_per_turn)
+            sides = [
+                counted(wheels.counter(f"{name}/{each}: {side}"), table.t, table.column(side), faults)
+                for side in table.columns
+            ]
+            lost = tuple(sorted({span for _, spans in sides for span in spans}))
+            rows = wheels.odometry(table.t, np.stack([counts for counts, _ in sides], axis=1), lost)
+        else:
+            moved = Wheels((), (), robot.radius, robot.track).motion(table.values)
+            rows = np.column_stack([driven_by(table.t, moved), moved])
+        parts["odom"] = Series(table.t, rows, COLUMNS)
+    return lost
 
 
 def rates_between(t: FloatArray, poses: FloatArray) -> FloatArray:

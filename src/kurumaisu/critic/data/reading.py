@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
 from kurumaisu.critic.bags.parts import is_split
+from kurumaisu.critic.bags.topics import Topic
 from kurumaisu.critic.data.bag_reader import PutAside, inventory, read_bag_run, resolve
 from kurumaisu.critic.data.carmen_reader import is_carmen, read_carmen_run
 from kurumaisu.critic.data.clean import Faults
@@ -104,21 +105,30 @@ def sources(path: Path) -> list[Path]:
 
 
 def read_run(
-    source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None = None
+    source: Path,
+    meta: Meta,
+    faults: Faults,
+    put_aside: PutAside | None = None,
+    topics: Mapping[str, Topic] | None = None,
 ) -> tuple[Run, LaserMount | None]:
-    """Return a run, and the laser's mounting where the file itself states it; put_aside: of a bag, as read_bag_run."""
-    run, mount = _read(source, meta, faults, put_aside)
+    """Return a run, and the laser's mounting where the file itself states it.
+
+    put_aside, topics: of a bag, as read_bag_run has them.
+    """
+    run, mount = _read(source, meta, faults, put_aside, topics)
     return completed(run, meta.command_hold, faults), mount
 
 
-def _read(source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None) -> tuple[Run, LaserMount | None]:
+def _read(
+    source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None, topics: Mapping[str, Topic] | None
+) -> tuple[Run, LaserMount | None]:
     if source.is_dir() and not is_bag(source):
         return read_csv_run(source, source.resolve().name, faults, meta.robot), None
     if is_rawlog(source):
         return read_rawlog_run(source, faults)
     if is_carmen(source):
         return read_carmen_run(source, faults)
-    run = read_bag_run(source, meta, faults, put_aside)
+    run = read_bag_run(source, meta, faults, put_aside, topics)
     queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
     return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
 

@@ -113,14 +113,14 @@ def withheld(recording: Recording, run: Run) -> bool:
 
 
 def _drives(recording: Recording, model: Model) -> dict[str, list[Drive]]:
-    """Return the drives by run, in pieces where the chair was held between.
+    """Return the drives by run, in pieces where what is between them is set aside.
 
     Without those of withheld runs that have too few poses left to judge by.
     """
     drives = {}
     for run in filter(driven, recording.runs):
         try:
-            drives[run.name] = without_spans(with_covariates(prepare(run, model), run), run.contacts)
+            drives[run.name] = without_spans(with_covariates(prepare(run, model), run), run.aside)
         except Error:
             if not withheld(recording, run):
                 raise

@@ -30,7 +30,7 @@ def set_aside(recording: Recording, model: Model) -> Recording:
         kept, words = _masked(run)
         held = contacts(kept, model)
         others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
-        runs.append(replace(kept, contacts=held, covariates=others))
+        runs.append(replace(kept, aside=(*kept.aside, *held), covariates=others))
         notes += [*words, *([_held(kept, held)] if held else [])]
     return replace(recording, runs=tuple(runs), problems=(*recording.problems, *notes))
 

@@ -49,7 +49,7 @@ class Run:
     scan: r0, r1, ... at the time of the first beam, nan = no valid reading, inf = no return;
     covariates: one Series of one column per name, finite values;
     queries: (q, 2) of t0, t1 in a test run; source of the pose: 'measured' or how it was estimated;
-    contacts: spans of time [s] in which the chair was held, which tell nothing of how it drives.
+    aside: spans of time [s] that tell nothing of how the chair drives: it was held, or its wheels began to count anew.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Run:
     queries: FloatArray | None = None
     pose_source: str = "measured"
     fan: Fan | None = None
-    contacts: tuple[tuple[float, float], ...] = ()
+    aside: tuple[tuple[float, float], ...] = ()
 
 
 def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict[str, Series]) -> Run:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from kurumaisu.viewer import Hub, Server, Source, ViewerSettings, read_settings,
 from kurumaisu.viewer.playback import Playback
 from kurumaisu.world import load_world
 
+_GLANCE = 0.1  # [s] after which it is seen whether all is to end
 _EPILOG = """\
 examples:
   view drive.bag                           one drive
@@ -57,14 +59,18 @@ def _serve(options: argparse.Namespace) -> None:
 
 def stay(server: Opened) -> None:
     """Serve, and tell where, until Ctrl-C or SIGTERM."""
-    ends = {signal.SIGINT, signal.SIGTERM}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ends)  # before threads begin: they inherit it
+    ended = threading.Event()
+    ends = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(each, lambda *_: ended.set()) for each in ends]
     try:
         with server:
             print(f"{server.told}\nopen {server.address}", flush=True)
-            signal.sigwait(ends)
+            # Looked at now and then: a thread of a library's may get the signal, which does not wake this one.
+            while not ended.wait(_GLANCE):
+                pass
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for each, handler in zip(ends, before, strict=True):
+            signal.signal(each, handler)
 
 
 class Live(Source, Protocol):

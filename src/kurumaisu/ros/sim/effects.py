@@ -13,6 +13,7 @@ from std_msgs.msg import String
 from kurumaisu.errors import Error, one_line
 from kurumaisu.params import EffectSetting
 from kurumaisu.ros.sim import effects_config as config
+from kurumaisu.viewer.effects import listed
 
 NAMESPACE = "live"  # of its parameters and services below the node's name
 
@@ -54,7 +55,7 @@ class LiveEffects:
         return wanted
 
     def _say(self) -> None:
-        text = config.listed(self._acting)
+        text = listed(self._acting)
         rospy.loginfo(f"SIM_EFFECTS {' '.join(text.split())}")
         self._topic.publish(text)
 

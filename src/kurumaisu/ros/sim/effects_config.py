@@ -83,16 +83,6 @@ def sift(request: Mapping[str, Any]) -> Asked:
     return asked
 
 
-def listed(settings: Sequence[EffectSetting]) -> str:
-    """Return effects as a file of them has it."""
-    lines = [f"  - {{id: {one.id}, parameters: {{{_values(one.parameters)}}}}}" for one in settings]
-    return "\n".join(["effects:", *lines]) if lines else "effects: []"
-
-
-def _values(parameters: Mapping[str, float]) -> str:
-    return ", ".join(f"{name}: {float(value)!r}" for name, value in parameters.items())
-
-
 def _bound(asked: Asked, name: str, value: float) -> None:
     effect, parameter = _NUMBERS[name]
     limits = f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
