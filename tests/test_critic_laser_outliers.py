@@ -8,6 +8,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -54,3 +55,19 @@ def test_a_burst_is_not_bent_to_do_what_beams_lose(tmp_path):
     causes = {cause.id: cause.parameters for cause in finding.causes}
     assert set(causes) == {"laser.crosstalk", "laser.dropout"}
     assert causes["laser.dropout"]["probability"].estimate == pytest.approx(0.04, rel=0.3)
+
+
+def test_readings_are_expected_from_where_a_scan_puts_its_reference():
+    """The second scan's reference is so far off that most readings are, by the first guess; one meets something."""
+    rng, beams = np.random.default_rng(3), np.linspace(-1, 1, 100)
+    z = rng.standard_normal((2, 100))
+    moved = np.stack([0.1 * beams, 80.0 * beams])
+    z[1] += moved[1]
+    z[:, 7] = 1000.0
+    known = np.ones(z.shape, dtype=bool)
+    known[:, 0] = False
+    start, inside = expected_readings(z, known, 2.0 + 0 * z, moved)
+    np.testing.assert_array_equal(start, [0 * beams, moved[1]])
+    expected = known.copy()
+    expected[:, 7] = False
+    np.testing.assert_array_equal(inside, expected)

@@ -33,12 +33,23 @@ POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
 
 
 @dataclass(frozen=True)
+class FreeMoments:
+    """Moments of a width [s] about their middles [s] in which a channel of the rates is anything, with an sd."""
+
+    channel: str
+    middles: FloatArray
+    width: float
+    sd: float
+
+
+@dataclass(frozen=True)
 class Drive:
     """Inputs and reference of one run.
 
     source: the channel that drives the replay; start [s] of the grid; v, w (n,) rates asked for on the grid;
     times (m + 1,) and poses (m + 1, 3) of the reference; known: what unknown effects may follow, (n,) each on the
-    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose.
+    grid, by the names that effects.Motion has; heading [rad] at the start of the grid, None: that of the first pose;
+    free: when nobody knows the rates, though poses are there.
     """
 
     name: str
@@ -50,6 +61,7 @@ class Drive:
     poses: FloatArray
     known: Mapping[str, FloatArray] = field(default_factory=dict)
     heading: float | None = None
+    free: FreeMoments | None = None
 
     @cached_property
     def measured(self) -> FloatArray:

@@ -14,6 +14,7 @@ from kurumaisu import effects
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.base.free_moments import free_columns
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import (
     Candidate,
@@ -204,12 +205,14 @@ class Problem:
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
         """Return columns (3 m, k) of one of the drives, whitened.
 
-        The reference's heading may be off by as much as it errs at any time throughout a drive: that is noise, too.
+        The reference's heading may be off by as much as it errs at any time throughout a drive: that is noise, too. So
+        is what a drive does in moments that are free.
         """
         if id(drive) not in self._whiteners:
             white = whitener(drive, self.noise)
             turned = self.noise.heading_sd * self.noise.louder * _turned(drive)
-            self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(turned))
+            nuisance = np.column_stack([turned, free_columns(drive, self.model)])
+            self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(nuisance))
         _, white, lasting = self._whiteners[id(drive)]
         return lasting.whiten(white.whiten(columns))
 

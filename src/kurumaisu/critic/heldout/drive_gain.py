@@ -11,6 +11,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, pieces, split
+from kurumaisu.critic.base.free_moments import free_columns
 from kurumaisu.critic.heldout import noise_floor
 from kurumaisu.critic.heldout.materiality import spans
 from kurumaisu.critic.noise.base_noise import Noise, whitened
@@ -116,7 +117,7 @@ def _log_density(drive: Drive, model: Model, fitted: FittedExtension, noise: Noi
     """Return the log density of each increment given those before it, (m, 3): dx, dy given dx, dtheta [nats]."""
     residual = drive.measured - replay.increments(drive, model, fitted.settings)
     residual[:, 2] = geometry.wrap(residual[:, 2])  # across a gap nobody counted the turns
-    columns = residual.reshape(-1, 1)
+    columns = np.hstack([residual.reshape(-1, 1), free_columns(drive, model)])
     if fitted.doubt is not None:
         columns = np.hstack([columns, fitted.doubt(drive)])
     white, log_determinants = whitened(drive, columns, noise)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.base.free_moments import all_free_columns
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
@@ -178,5 +179,9 @@ def noise_residuals(
             return problem.simulated_columns(drive, fit)
         return joint_fit.simulated_columns(problem, drive, beside)
 
-    projected = [columns(drive, left.size) for drive, left in zip(problem.drives, residuals, strict=True)]
+    free = all_free_columns(problem.drives, problem.model)
+    projected = [
+        np.hstack([own, columns(drive, left.size)])
+        for own, drive, left in zip(free, problem.drives, residuals, strict=True)
+    ]
     return base_noise.NoiseResiduals(problem.drives, residuals, projected, truth)

@@ -52,6 +52,14 @@ def criticise_drives(
     train = list(first.drives)
     test = [drive for name in recording.test for drive in drives.get(name, [])]
     made = decide(first, recording.truth, progress)
+    going = unresolved.certain_intermittent(made, [*train, *test])
+    if going is not None:
+        progress("judging what is left without the moments in which something comes and goes")
+        train, test = [going.freed(drive) for drive in train], [going.freed(drive) for drive in test]
+        rough, first = rough.changed(drives=tuple(train)), first.changed(drives=tuple(train))
+        made = decide(first, recording.truth, progress)
+        # What is left of such moments grows with the rates as well: of the noise that says nothing.
+        made = replace(made, growth=replace(made.growth, p=0.0))
 
     progress("measuring the gain on held-out drives")
     left = noise_residuals(rough, rough.fit((), {}), recording.truth, project=False)
@@ -65,7 +73,7 @@ def criticise_drives(
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
     best = made.found.best.settings
     shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
-    judged = unresolved.with_unresolved(judged, made, held, shares, test)
+    judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=multipliers.measured(made.problem, made.found.best))
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Something is surely wrong, and the data do not say what: amber, never green.
+"""Something is surely wrong, and the data do not say what, or only when it was: amber, never green.
 
 Drives held out tell it: what was found, though nobody can name it, predicts them better; or the model leaves them
 farther off than the noise allows. Data too few to tell effects from noise do where any noise would make it likelier.
@@ -11,13 +11,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import expit
 
+from kurumaisu import effects
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.heldout import drive_gain
+from kurumaisu.critic.heldout.materiality import CERTAIN, MATERIAL
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
+from kurumaisu.critic.unknown import sentences
+from kurumaisu.critic.unknown.intermittent import Intermittent, intermittent
 from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.digits import moment
+from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
@@ -60,6 +68,48 @@ def with_unresolved(
         )
         return _amber(criticism, f"held-out motion off {times:.1f} times as far as noise allows", words)
     return criticism
+
+
+def certain_intermittent(made: Decision, drives: Sequence[Drive]) -> Intermittent | None:
+    """Return what surely comes and goes in drives beside what was found, and matters; None where nothing does."""
+    problem, found, extension = made.problem, made.found, made.extension
+    if not found.enough or (problem.ids is not None and effects.SMOOTH not in problem.ids):
+        return None
+    one = intermittent(problem, drives, (found.best if extension is None else extension).settings)
+    if one is None or one.nats < CERTAIN or one.share * abs(one.size) < MATERIAL * _usual(problem, one.channel):
+        return None
+    return one
+
+
+def with_intermittent(criticism: Criticism, one: Intermittent | None) -> Criticism:
+    """Return a criticism that tells what comes and goes beside all that was found, with when that was."""
+    if one is None:
+        return criticism
+    rate, share = sentences.CHANNEL_NAMES[one.channel], f"{100 * one.share:.0f} % of the time"
+    unit = {"v": " m/s", "w": " rad/s"}.get(one.channel)
+    size = f"{abs(one.size):.2g}{unit}" if unit else f"{100 * abs(one.size):.0f} %"
+    shape = f"comes and goes: {'more' if one.size > 0 else 'less'} by {size} for {share}"
+    run, since, until = one.moments[0]
+    words = (
+        f"Outside the catalogue: now and then the {rate} is {'larger' if one.size > 0 else 'smaller'} by {size}, for "
+        f"{share} (surest in {run} from {moment(since)} to {moment(until)}). The rest is judged without these moments."
+    )
+    p = float(expit(one.nats + np.log(UNKNOWN_ODDS)))
+    unknown = Unknown(f"base.{effects.CHANNELS[one.channel].rate}", "time", shape, p)
+    before = criticism.verdict
+    others = tuple(other for other in before.unknown if other.covariate != COVARIATE)
+    headline = words if before.verdict == "none" else f"{words} Besides: {criticism.story.headline}"
+    verdict = replace(before, verdict="unknown", unknown=(unknown, *others))
+    return replace(criticism, verdict=verdict, story=replace(criticism.story, headline=headline))
+
+
+def _usual(problem: Problem, channel: str) -> float:
+    """Return the rms of what a channel's curve is added to."""
+    into = effects.CHANNELS[channel]
+    if into.by:
+        return 1.0
+    motions = [replay.motion(drive, problem.model, ()) for drive in problem.drives]
+    return float(np.sqrt(np.mean(np.concatenate([getattr(one, into.rate) for one in motions]) ** 2)))
 
 
 def _whatever_noise(found: SearchResult) -> float:

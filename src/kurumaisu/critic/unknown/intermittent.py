@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""What comes and goes: for a moment now and then a rate is another, as where packets are lost or a wheel spins.
+
+No curve over the time has knots enough for it, and it passes for noise. But noise is as large at any time, and to
+either side: where for a small share of the time a rate is off to one side, a mixture of two normal distributions is
+likelier than one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import expit
+from scipy.stats import norm
+
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive, FreeMoments
+from kurumaisu.critic.base.free_moments import hats
+from kurumaisu.critic.base.sensitivity import Sensitivity
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.params import EffectSetting
+from kurumaisu.types import BoolArray, FloatArray
+
+_CHANNELS = ("v_gain", "w_gain", "v", "w")
+_WIDTH = 0.5  # [s] of a moment, or
+_POSES = 2.0  # intervals of the reference: what is briefer shows in none
+_SEEN = 0.05  # share of the usual information about a moment, below which it tells nothing
+_FEWEST = 30  # moments
+_SHARES = (0.05, 0.15, 0.3)  # of the time, from which a mixture is fitted
+_MOST = 0.5  # share at most: what is there more often is the rule
+_APART = 2.0  # sds of the noise by which the other value must be off: noise of two sizes is no event
+_FREE = 2.0  # times its size that it may have at any moment
+_PLAUSIBLE = 0.05  # probability of a moment from which it is set free
+_ROUNDS = 100
+_PARAMETERS = 3  # that a mixture has more than one distribution
+
+
+@dataclass(frozen=True)
+class Intermittent:
+    """What comes and goes in a channel.
+
+    nats: for it over noise; share: of the time that it is there; size: of the curve in the channel meanwhile; moments:
+    the drive's name, begin and end [s] of each, the surest first.
+    """
+
+    channel: str
+    nats: float
+    share: float
+    size: float
+    moments: tuple[tuple[str, float, float], ...]
+
+    def freed(self, drive: Drive) -> Drive:
+        """Return a drive whose rates are free in those moments."""
+        own = np.array([(since, until) for name, since, until in self.moments if name == drive.name])
+        if not len(own):
+            return drive
+        free = FreeMoments(self.channel, own.mean(axis=1), float(np.ptp(own[0])), _FREE * abs(self.size))
+        return replace(drive, free=free)
+
+
+@dataclass(frozen=True)
+class _Moments:
+    """Moments: the drive and the middle [s] of each, z and its size if the curve were 1 (n,)."""
+
+    drives: list[str]
+    middles: FloatArray
+    width: float
+    z: FloatArray
+    information: FloatArray
+
+
+@dataclass(frozen=True)
+class _Mixture:
+    """Two normal distributions: evidence [nat] over one, how often the second is met, its mean, and where (n,)."""
+
+    nats: float
+    share: float
+    mean: float
+    sd: float
+    there: FloatArray
+
+
+def intermittent(problem: Problem, drives: Sequence[Drive], settings: Sequence[EffectSetting]) -> Intermittent | None:
+    """Return what comes and goes in drives beside settings where it is likeliest; None where nothing does.
+
+    drives: those of the problem, and others like them.
+    """
+    every = problem.changed(drives=tuple(drives))
+    found = [one for channel in _CHANNELS if (one := _in_channel(every, settings, channel)) is not None]
+    return max(found, key=lambda one: one.nats, default=None)
+
+
+def _in_channel(problem: Problem, settings: Sequence[EffectSetting], channel: str) -> Intermittent | None:
+    moments = _moments(problem, settings, channel)
+    if len(moments.z) < _FEWEST:
+        return None
+    best = max(_mixtures(moments.z), key=lambda one: one.nats)
+    if abs(best.mean) < _APART * best.sd:
+        return None
+    here: BoolArray = best.there > 1 / 2
+    # The rows of a moment tell its mean by weights of their information.
+    size = float(np.sum((moments.z * np.sqrt(moments.information))[here]) / max(moments.information[here].sum(), 1e-12))
+    order = np.argsort(-best.there, kind="stable")[: int(np.sum(best.there > _PLAUSIBLE))]
+    half = moments.width / 2
+    surest = tuple(
+        (moments.drives[i], float(moments.middles[i] - half), float(moments.middles[i] + half)) for i in order
+    )
+    return Intermittent(channel, best.nats, best.share, size, surest)
+
+
+def _moments(problem: Problem, settings: Sequence[EffectSetting], channel: str) -> _Moments:
+    """Return what each moment of the drives says of a curve that is 1 then, alone."""
+    width = max(_WIDTH, _POSES * float(np.median(np.concatenate([np.diff(one.times) for one in problem.drives]))))
+    names: list[str] = []
+    parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+    for drive in problem.drives:
+        left = problem.whitened(drive, (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1))[:, 0]
+        motion = replay.motion(drive, problem.model, settings)
+        middles = np.arange(drive.times[0] + width / 2, drive.times[-1], width)
+        raw = Sensitivity(drive, motion).increments(channel, hats(drive, len(motion.moving), middles, width))
+        columns = problem.whitened(drive, raw)
+        parts.append((middles, columns.T @ left, np.einsum("ij,ij->j", columns, columns)))
+        names += [drive.name] * len(middles)
+    middles, pulls, information = (np.concatenate(some) for some in zip(*parts, strict=True))
+    seen = information > 0
+    seen = information > _SEEN * float(np.median(information[seen])) if seen.any() else seen
+    return _Moments(
+        [name for name, use in zip(names, seen, strict=True) if use],
+        middles[seen],
+        width,
+        pulls[seen] / np.sqrt(information[seen]),
+        information[seen],
+    )
+
+
+def _mixtures(z: FloatArray) -> Iterator[_Mixture]:
+    """Yield mixtures of two normal distributions of z (n,), each fitted from another start."""
+    one = float(norm.logpdf(z, z.mean(), z.std()).sum())
+    for share in _SHARES:
+        for sign in (1.0, -1.0):
+            first = (sign * z >= np.quantile(sign * z, 1 - share)).astype(float)
+            there, log_density, share_there, mean, sd = _fitted(z, first)
+            nats = log_density - one - 0.5 * _PARAMETERS * float(np.log(len(z)))
+            yield _Mixture(nats, share_there, mean, sd, there)
+
+
+def _fitted(z: FloatArray, there: FloatArray) -> tuple[FloatArray, float, float, float, float]:
+    """Return where the second one is met, log density, its share, its mean off the first, and the sd of that."""
+    density = -np.inf
+    share = mean = middle = sd = other = 0.0
+    for _ in range(_ROUNDS):
+        share = float(np.clip(there.mean(), 1e-3, _MOST))
+        middle, mean = (float(np.average(z, weights=weight + 1e-12)) for weight in (1 - there, there))
+        sd, other = (
+            float(np.sqrt(np.average((z - at) ** 2, weights=weight + 1e-12)))
+            for at, weight in ((middle, 1 - there), (mean, there))
+        )
+        other = max(other, 0.5 * sd)  # else a single moment would be infinitely likely
+        usual = np.log1p(-share) + norm.logpdf(z, middle, sd)
+        rare = np.log(share) + norm.logpdf(z, mean, other)
+        there, density = expit(rare - usual), float(np.logaddexp(usual, rare).sum())
+    return there, density, share, mean - middle, sd
