@@ -2,9 +2,8 @@
 """What the equation of a cause may miss, as a part of the noise: no real lag has one pole.
 
 A cause that acts adds a Gaussian process to the covariance: its signal times smooth functions of the rates, their
-changes, the time, the time since a command and the heading, its size (more to one side than to the other), and what
-the same cause would do with other sizes, as a soft corner or a second pole does. What its own sizes can do is left out
-of it, so that it moves no size.
+changes, the time, the time since a command and the heading, and what the same cause would do with other sizes, as a
+soft corner or a second pole does. What its own sizes can do is left out of it, so that it moves no size.
 """
 
 from __future__ import annotations
@@ -71,7 +70,6 @@ def _marks(problem: Problem, drive: Drive, terms: Sequence[Term], values: FloatA
     for axes in ((True, True, False), (False, False, True)):
         part = np.where(axes, signal, 0.0)
         whole.append((part[:, :, None] * smooth[:, None, :]).reshape(signal.size, -1))
-        whole.append(np.abs(part).reshape(-1, 1))  # to one side more than to the other
     whole += [(problem.simulated(drive, other) - here).reshape(-1, 1) for other in _other_sizes(terms, values, name)]
     return problem.whitened(drive, np.concatenate(whole, axis=1))
 

@@ -26,9 +26,7 @@ from kurumaisu.types import FloatArray
 _DRAWN = 0.8  # share of a signal's square that a curve can draw, from which it is one
 _HINTS = 3  # curves in whose place others are tried: most of a jump shows in a curve that cannot jump
 _BENDING = _JUMPING = 0.2  # share of what is outside the catalogue that bends more often, or jumps
-_ALIKE = (
-    0.86  # correlation with an effect's signal from which a curve draws it: one that grows steadily from none has 0.87
-)
+_ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
 _NO_LEVEL = 0.05  # share of a signal's square beyond a level, below which it is one
 _SAME = 0.1  # share of the rates by which they may differ and be nearly the same
 _WORTH = -2.0  # [nat] below which a curve is not kept
