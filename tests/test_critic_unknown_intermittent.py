@@ -8,8 +8,13 @@ import pytest
 from hidden_effect import Disturbance, recording
 
 from kurumaisu.critic import pipeline
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.unknown import intermittent
-from kurumaisu.params import shipped
+from kurumaisu.params import load_model, shipped
+
+MODEL = load_model(shipped("launch/md100.yaml"))
 
 
 def losing(data, share, lasts=0.8, every=5.0):
@@ -49,6 +54,16 @@ def test_packets_that_are_lost_are_told_with_their_time():
 def test_noise_does_not_come_and_go(noise):
     found = criticised(recording(None, 0.0, 72, 40.0, noise))
     assert not [one for one in found.verdict.unknown if one.shape.startswith("comes and goes")]
+
+
+def test_moments_that_share_a_column_say_what_they_say_alone(monkeypatch):
+    (run, *_) = recording(None, 0.0, 73, 90.0).runs
+    problem = Problem([prepare(run, MODEL)], MODEL, base_noise.START)
+    shared = intermittent._moments(problem, (), "v")
+    monkeypatch.setattr(intermittent, "_APART_BY", 1000.0)
+    alone = intermittent._moments(problem, (), "v")
+    np.testing.assert_array_equal(shared.middles, alone.middles)
+    np.testing.assert_allclose(shared.z, alone.z, atol=0.1)
 
 
 @pytest.mark.parametrize(("apart", "nats"), [(0.0, -np.inf), (4.0, 12.0)])

@@ -36,7 +36,9 @@ def all_free_columns(drives: Sequence[Drive], model: Model) -> list[FloatArray]:
     ]
 
 
-def hats(drive: Drive, cells: int, middles: FloatArray, width: float) -> FloatArray:
-    """Return a hat about each of some middles [s] over the cells of a drive's grid, (cells, k)."""
-    at = drive.start + GRID * (np.arange(cells) + 0.5)
-    return np.asarray(np.maximum(1 - np.abs(at[:, np.newaxis] - middles) / width, 0.0))
+def hats(drive: Drive, cells: int, middles: FloatArray, width: float, again: float = np.inf) -> FloatArray:
+    """Return a hat about each of some middles [s], and again every so many, over a drive's grid, (cells, k)."""
+    off = drive.start + GRID * (np.arange(cells) + 0.5)[:, np.newaxis] - middles
+    if np.isfinite(again):
+        off -= again * np.rint(off / again)
+    return np.asarray(np.maximum(1 - np.abs(off) / width, 0.0))

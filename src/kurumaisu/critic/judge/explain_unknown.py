@@ -134,7 +134,7 @@ def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
     mean, sd = shapes.band(extension, at)
     return Misfit(
         channel=sentences.CHANNEL_NAMES[extension.curve.channel],
-        unit=sentences.unit_of(extension.curve),
+        unit=sentences.unit_of(extension.curve.channel),
         covariate_name=covariate,
         covariate_unit=unit,
         covariate=x,

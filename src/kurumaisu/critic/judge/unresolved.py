@@ -23,9 +23,11 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.intermittent import Intermittent, intermittent
+from kurumaisu.critic.values.binned_means import bins
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.story import Misfit
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
@@ -86,7 +88,7 @@ def with_intermittent(criticism: Criticism, one: Intermittent | None) -> Critici
     if one is None:
         return criticism
     rate, share = sentences.CHANNEL_NAMES[one.channel], f"{100 * one.share:.0f} % of the time"
-    unit = {"v": " m/s", "w": " rad/s"}.get(one.channel)
+    unit = "" if effects.CHANNELS[one.channel].by else f" {effects.CHANNELS[one.channel].unit}"
     size = f"{abs(one.size):.2g}{unit}" if unit else f"{100 * abs(one.size):.0f} %"
     shape = f"comes and goes: {'more' if one.size > 0 else 'less'} by {size} for {share}"
     run, since, until = one.moments[0]
@@ -98,9 +100,31 @@ def with_intermittent(criticism: Criticism, one: Intermittent | None) -> Critici
     unknown = Unknown(f"base.{effects.CHANNELS[one.channel].rate}", "time", shape, p)
     before = criticism.verdict
     others = tuple(other for other in before.unknown if other.covariate != COVARIATE)
-    headline = words if before.verdict == "none" else f"{words} Besides: {criticism.story.headline}"
-    verdict = replace(before, verdict="unknown", unknown=(unknown, *others))
-    return replace(criticism, verdict=verdict, story=replace(criticism.story, headline=headline))
+    alone = before.verdict == "none"
+    verdict = replace(before, verdict="unknown", unknown=(unknown, *others), gain=None if alone else before.gain)
+    story = replace(
+        criticism.story,
+        headline=words if alone else f"{words} Besides: {criticism.story.headline}",
+        misfits=(_figure(one, shape), *(() if alone else criticism.story.misfits)),
+    )
+    return replace(criticism, verdict=verdict, story=story)
+
+
+def _figure(one: Intermittent, shape: str) -> Misfit:
+    """Return by how much the channel was off in every moment, over the time."""
+    first = np.array([one.samples.t[one.samples.run == run].min() for run in range(len(one.samples.runs))])
+    since = one.samples.t - first[one.samples.run]
+    return Misfit(
+        channel=sentences.CHANNEL_NAMES[one.channel],
+        unit=sentences.unit_of(one.channel),
+        covariate_name="time since the start",
+        covariate_unit="s",
+        covariate=since,
+        residual=one.offsets,
+        bins=bins(since, one.offsets),
+        explained_by=f"not in the catalogue: {shape}",
+        moments=one.samples,
+    )
 
 
 def _usual(problem: Problem, channel: str) -> float:

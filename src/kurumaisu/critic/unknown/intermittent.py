@@ -20,8 +20,9 @@ from kurumaisu.critic.base.drive import Drive, FreeMoments
 from kurumaisu.critic.base.free_moments import hats
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.values.story import Moments
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CHANNELS = ("v_gain", "w_gain", "v", "w")
 _WIDTH = 0.5  # [s] of a moment, or
@@ -31,6 +32,7 @@ _FEWEST = 30  # moments
 _SHARES = (0.05, 0.15, 0.3)  # of the time, from which a mixture is fitted
 _MOST = 0.5  # share at most: what is there more often is the rule
 _APART = 2.0  # sds of the noise by which the other value must be off: noise of two sizes is no event
+_APART_BY = 40.0  # [s] two moments of one column: longer than any noise that is estimated lasts
 _FREE = 2.0  # times its size that it may have at any moment
 _PLAUSIBLE = 0.05  # probability of a moment from which it is set free
 _ROUNDS = 100
@@ -42,7 +44,8 @@ class Intermittent:
     """What comes and goes in a channel.
 
     nats: for it over noise; share: of the time that it is there; size: of the curve in the channel meanwhile; moments:
-    the drive's name, begin and end [s] of each, the surest first.
+    the drive's name, begin and end [s] of each, the surest first; samples, offsets (n,): when and where every moment of
+    the drives was, and by how much the channel was off.
     """
 
     channel: str
@@ -50,6 +53,8 @@ class Intermittent:
     share: float
     size: float
     moments: tuple[tuple[str, float, float], ...]
+    samples: Moments
+    offsets: FloatArray
 
     def freed(self, drive: Drive) -> Drive:
         """Return a drive whose rates are free in those moments."""
@@ -62,9 +67,9 @@ class Intermittent:
 
 @dataclass(frozen=True)
 class _Moments:
-    """Moments: the drive and the middle [s] of each, z and its size if the curve were 1 (n,)."""
+    """Moments (n,): the drive of each and its middle [s], z, and the information about a curve that is 1 then."""
 
-    drives: list[str]
+    drive: IntArray
     middles: FloatArray
     width: float
     z: FloatArray
@@ -103,36 +108,59 @@ def _in_channel(problem: Problem, settings: Sequence[EffectSetting], channel: st
     # The rows of a moment tell its mean by weights of their information.
     size = float(np.sum((moments.z * np.sqrt(moments.information))[here]) / max(moments.information[here].sum(), 1e-12))
     order = np.argsort(-best.there, kind="stable")[: int(np.sum(best.there > _PLAUSIBLE))]
-    half = moments.width / 2
-    surest = tuple(
-        (moments.drives[i], float(moments.middles[i] - half), float(moments.middles[i] + half)) for i in order
-    )
-    return Intermittent(channel, best.nats, best.share, size, surest)
+    spans = moments.middles[:, np.newaxis] + moments.width * np.array([-0.5, 0.5])
+    surest = tuple((problem.drives[moments.drive[i]].name, float(spans[i, 0]), float(spans[i, 1])) for i in order)
+    samples = _samples(problem.drives, moments)
+    return Intermittent(channel, best.nats, best.share, size, surest, samples, moments.z / np.sqrt(moments.information))
+
+
+def _samples(drives: Sequence[Drive], moments: _Moments) -> Moments:
+    """Return when and where moments were."""
+    runs = tuple(dict.fromkeys(drive.name for drive in drives))
+    places = np.zeros((len(moments.z), 2))
+    for i, drive in enumerate(drives):
+        own = moments.drive == i
+        for axis in (0, 1):
+            places[own, axis] = np.interp(moments.middles[own], drive.times, drive.poses[:, axis])
+    run = np.array([runs.index(drive.name) for drive in drives])[moments.drive]
+    return Moments(runs, run, moments.middles, places)
 
 
 def _moments(problem: Problem, settings: Sequence[EffectSetting], channel: str) -> _Moments:
     """Return what each moment of the drives says of a curve that is 1 then, alone."""
     width = max(_WIDTH, _POSES * float(np.median(np.concatenate([np.diff(one.times) for one in problem.drives]))))
-    names: list[str] = []
-    parts: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-    for drive in problem.drives:
-        left = problem.whitened(drive, (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1))[:, 0]
-        motion = replay.motion(drive, problem.model, settings)
-        middles = np.arange(drive.times[0] + width / 2, drive.times[-1], width)
-        raw = Sensitivity(drive, motion).increments(channel, hats(drive, len(motion.moving), middles, width))
-        columns = problem.whitened(drive, raw)
-        parts.append((middles, columns.T @ left, np.einsum("ij,ij->j", columns, columns)))
-        names += [drive.name] * len(middles)
-    middles, pulls, information = (np.concatenate(some) for some in zip(*parts, strict=True))
+    each = [_told(problem, drive, settings, channel, width) for drive in problem.drives]
+    drive = np.repeat(np.arange(len(each)), [len(middles) for middles, _, _ in each])
+    middles, pulls, information = (np.concatenate(some) for some in zip(*each, strict=True))
     seen = information > 0
     seen = information > _SEEN * float(np.median(information[seen])) if seen.any() else seen
-    return _Moments(
-        [name for name, use in zip(names, seen, strict=True) if use],
-        middles[seen],
-        width,
-        pulls[seen] / np.sqrt(information[seen]),
-        information[seen],
-    )
+    z = pulls[seen] / np.sqrt(information[seen])
+    return _Moments(drive[seen], middles[seen], width, z, information[seen])
+
+
+def _told(
+    problem: Problem, drive: Drive, settings: Sequence[EffectSetting], channel: str, width: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the middles of a drive's moments, and pull and information of a curve that is 1 at each, (n,) each.
+
+    Moments that are far apart share a column, of which each has the rows about it.
+    """
+    left = problem.whitened(drive, (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1))[:, 0]
+    motion = replay.motion(drive, problem.model, settings)
+    middles = np.arange(drive.times[0] + width / 2, drive.times[-1], width)
+    count = min(len(middles), int(np.ceil(_APART_BY / width)))
+    columns = np.zeros((len(left), 0))
+    if count:
+        shared = hats(drive, len(motion.moving), middles[:count], width, again=count * width)
+        columns = problem.whitened(drive, Sensitivity(drive, motion).increments(channel, shared))
+    at = np.repeat((drive.times[1:] + drive.times[:-1]) / 2, 3)
+    pulls, information = np.zeros(len(middles)), np.zeros(len(middles))
+    for j, column in enumerate(columns.T):
+        own = np.arange(j, len(middles), count)
+        nearest = np.clip(np.rint((at - middles[j]) / (count * width)).astype(int), 0, len(own) - 1)
+        pulls[own] = np.bincount(nearest, column * left, len(own))
+        information[own] = np.bincount(nearest, column**2, len(own))
+    return middles, pulls, information
 
 
 def _mixtures(z: FloatArray) -> Iterator[_Mixture]:

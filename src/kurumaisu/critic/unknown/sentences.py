@@ -60,15 +60,15 @@ def followed(curve: Curve) -> str:
     return "constant" if curve.basis.covariate == effects.MOVING else f"over {covariate(curve)[0]}"
 
 
-def unit_of(curve: Curve) -> str:
-    """Return the unit of the curve; in words where it is a share."""
-    return _SHARES.get(curve.channel, effects.CHANNELS[curve.channel].unit)
+def unit_of(channel: str) -> str:
+    """Return the unit of a channel's curves; in words where it is a share."""
+    return _SHARES.get(channel, effects.CHANNELS[channel].unit)
 
 
 def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
     """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
     found = shape_of(extension)
-    unit, rate = covariate(extension.curve)[2], unit_of(extension.curve)
+    unit, rate = covariate(extension.curve)[2], unit_of(extension.curve.channel)
     size = _quantity(found, "size", rate, intervals)
     if found.kind == "periodic":
         times = round(extension.curve.basis.constants["period"] / found.place[0])
