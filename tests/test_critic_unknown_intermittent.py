@@ -66,6 +66,15 @@ def test_moments_that_share_a_column_say_what_they_say_alone(monkeypatch):
     np.testing.assert_allclose(shared.z, alone.z, atol=0.1)
 
 
+def test_a_gap_in_the_poses_is_not_told_many_times():
+    (run, *_) = recording(None, 0.0, 73, 60.0).runs
+    some = (run.pose.t < 20) | (run.pose.t > 40)
+    holed = replace(run, pose=replace(run.pose, t=run.pose.t[some], values=run.pose.values[some]))
+    moments = intermittent._moments(Problem([prepare(holed, MODEL)], MODEL, base_noise.START), (), "v")
+    assert not np.any((moments.middles > 20.5) & (moments.middles < 39.5))
+    assert len(moments.z) > 50
+
+
 @pytest.mark.parametrize(("apart", "nats"), [(0.0, -np.inf), (4.0, 12.0)])
 def test_a_mixture_is_likelier_where_some_moments_are_off_to_one_side(apart, nats):
     rng = np.random.default_rng(4)

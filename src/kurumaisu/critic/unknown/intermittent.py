@@ -160,7 +160,9 @@ def _told(
         nearest = np.clip(np.rint((at - middles[j]) / (count * width)).astype(int), 0, len(own) - 1)
         pulls[own] = np.bincount(nearest, column * left, len(own))
         information[own] = np.bincount(nearest, column**2, len(own))
-    return middles, pulls, information
+    # Where no pose is for longer, one increment would be told many times.
+    gaps = np.diff(drive.times)[np.clip(np.searchsorted(drive.times, middles) - 1, 0, len(drive.times) - 2)] > width
+    return middles, pulls, np.where(gaps, 0.0, information)
 
 
 def _mixtures(z: FloatArray) -> Iterator[_Mixture]:
