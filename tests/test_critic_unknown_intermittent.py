@@ -60,7 +60,7 @@ def test_moments_that_share_a_column_say_what_they_say_alone(monkeypatch):
     (run, *_) = recording(None, 0.0, 73, 90.0).runs
     problem = Problem([prepare(run, MODEL)], MODEL, base_noise.START)
     shared = intermittent._moments(problem, (), "v")
-    monkeypatch.setattr(intermittent, "_APART_BY", 1000.0)
+    monkeypatch.setattr(intermittent, "_SPACING", 1000.0)
     alone = intermittent._moments(problem, (), "v")
     np.testing.assert_array_equal(shared.middles, alone.middles)
     np.testing.assert_allclose(shared.z, alone.z, atol=0.1)
@@ -83,5 +83,5 @@ def test_a_mixture_is_likelier_where_some_moments_are_off_to_one_side(apart, nat
     assert (best.nats > 0) == (apart > 0)
     assert best.nats > nats
     if apart:
-        assert best.mean == pytest.approx(-apart, abs=0.5)
+        assert best.apart == pytest.approx(-apart, abs=0.5)
         assert best.share == pytest.approx(0.1, abs=0.03)

@@ -75,26 +75,34 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     it, too, and the likelier one holds, each heard with its own noise.
     """
     found = search.search(first, progress)
-    made = _settled(first, found, likelier_curve(found), truth, progress)
+    curve = likelier_curve(found)
+    made = _settled(first, found, curve, _noise_about(first, found, curve, truth, progress), truth, progress)
     hint = _hinted_curve(first, found) if made.extension is None and found.enough else None
     if hint is None:
         return made
-    density = _log_density(made.problem, made.found.log_posterior(_likeliest(made.found)))
-    about = first.changed(noise=_noise_about(first, found, hint, truth, progress).noise)
-    if _density_with(about, hint, found) < density + _HINT:
+    growth, density = _noise_about(first, found, hint, truth, progress), _density(made)
+    if _density_with(first.changed(noise=growth.noise), hint, found) < density + _HINT:
         return made
-    other = _settled(first, found, hint, truth, progress)
-    likelier = _log_density(other.problem, other.found.log_posterior(_likeliest(other.found))) > density + _LEAST
-    return other if other.extension is not None and likelier else made
+    other = _settled(first, found, hint, growth, truth, progress)
+    return other if other.extension is not None and _density(other) > density + _LEAST else made
 
 
 def _settled(
-    first: Problem, found: SearchResult, curve: SetWithCurve | None, truth: Truth, progress: Progress
+    first: Problem,
+    found: SearchResult,
+    curve: SetWithCurve | None,
+    growth: base_noise.NoiseGrowth,
+    truth: Truth,
+    progress: Progress,
 ) -> Decision:
-    """Return what acts in the noise about what was found, a curve among it or not; anew where others act then."""
+    """Return what acts in the noise about what was found, a curve among it or not; anew where others act then.
+
+    growth: that noise, as of _noise_about.
+    """
     problem: Problem | None = None
-    for _ in range(_ANEW):
-        growth = _noise_about(first, found, curve, truth, progress)
+    for again in range(_ANEW):
+        if again:
+            growth = _noise_about(first, found, curve, truth, progress)
         if problem is not None and base_noise.alike(growth.noise, problem.noise):
             break
         if problem is None and curve is None and base_noise.alike(growth.noise, first.noise):
@@ -141,8 +149,9 @@ def _log_density(problem: Problem, log_posterior: float) -> float:
     return log_posterior - 0.5 * volume
 
 
-def _likeliest(found: SearchResult) -> Fit | SetWithCurve:
-    return likelier_curve(found) or found.best
+def _density(made: Decision) -> float:
+    """Return that of the likeliest set, with a curve or without."""
+    return _log_density(made.problem, made.found.log_posterior(likelier_curve(made.found) or made.found.best))
 
 
 def _density_with(problem: Problem, curve: SetWithCurve, found: SearchResult) -> float:

@@ -21,6 +21,7 @@ from kurumaisu.critic.base.free_moments import hats
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.values.story import Moments
+from kurumaisu.geometry import interpolate
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -32,7 +33,7 @@ _FEWEST = 30  # moments
 _SHARES = (0.05, 0.15, 0.3)  # of the time, from which a mixture is fitted
 _MOST = 0.5  # share at most: what is there more often is the rule
 _APART = 2.0  # sds of the noise by which the other value must be off: noise of two sizes is no event
-_APART_BY = 40.0  # [s] two moments of one column: longer than any noise that is estimated lasts
+_SPACING = 40.0  # [s] between moments that share a column: longer than any noise that is estimated lasts
 _FREE = 2.0  # times its size that it may have at any moment
 _PLAUSIBLE = 0.05  # probability of a moment from which it is set free
 _ROUNDS = 100
@@ -78,11 +79,14 @@ class _Moments:
 
 @dataclass(frozen=True)
 class _Mixture:
-    """Two normal distributions: evidence [nat] over one, how often the second is met, its mean, and where (n,)."""
+    """Two normal distributions: evidence [nat] over one; how often the second is met, and where (n,).
+
+    apart: its mean less that of the first; sd: of the first.
+    """
 
     nats: float
     share: float
-    mean: float
+    apart: float
     sd: float
     there: FloatArray
 
@@ -102,7 +106,7 @@ def _in_channel(problem: Problem, settings: Sequence[EffectSetting], channel: st
     if len(moments.z) < _FEWEST:
         return None
     best = max(_mixtures(moments.z), key=lambda one: one.nats)
-    if abs(best.mean) < _APART * best.sd:
+    if abs(best.apart) < _APART * best.sd:
         return None
     here: BoolArray = best.there > 1 / 2
     # The rows of a moment tell its mean by weights of their information.
@@ -120,8 +124,7 @@ def _samples(drives: Sequence[Drive], moments: _Moments) -> Moments:
     places = np.zeros((len(moments.z), 2))
     for i, drive in enumerate(drives):
         own = moments.drive == i
-        for axis in (0, 1):
-            places[own, axis] = np.interp(moments.middles[own], drive.times, drive.poses[:, axis])
+        places[own] = interpolate(drive.times, drive.poses, moments.middles[own])[:, :2]
     run = np.array([runs.index(drive.name) for drive in drives])[moments.drive]
     return Moments(runs, run, moments.middles, places)
 
@@ -148,7 +151,7 @@ def _told(
     left = problem.whitened(drive, (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1))[:, 0]
     motion = replay.motion(drive, problem.model, settings)
     middles = np.arange(drive.times[0] + width / 2, drive.times[-1], width)
-    count = min(len(middles), int(np.ceil(_APART_BY / width)))
+    count = min(len(middles), int(np.ceil(_SPACING / width)))
     columns = np.zeros((len(left), 0))
     if count:
         shared = hats(drive, len(motion.moving), middles[:count], width, again=count * width)
@@ -167,28 +170,26 @@ def _told(
 
 def _mixtures(z: FloatArray) -> Iterator[_Mixture]:
     """Yield mixtures of two normal distributions of z (n,), each fitted from another start."""
-    one = float(norm.logpdf(z, z.mean(), z.std()).sum())
     for share in _SHARES:
         for sign in (1.0, -1.0):
-            first = (sign * z >= np.quantile(sign * z, 1 - share)).astype(float)
-            there, log_density, share_there, mean, sd = _fitted(z, first)
-            nats = log_density - one - 0.5 * _PARAMETERS * float(np.log(len(z)))
-            yield _Mixture(nats, share_there, mean, sd, there)
+            yield _fitted(z, (sign * z >= np.quantile(sign * z, 1 - share)).astype(float))
 
 
-def _fitted(z: FloatArray, there: FloatArray) -> tuple[FloatArray, float, float, float, float]:
-    """Return where the second one is met, log density, its share, its mean off the first, and the sd of that."""
-    density = -np.inf
-    share = mean = middle = sd = other = 0.0
+def _fitted(z: FloatArray, there: FloatArray) -> _Mixture:
+    """Return the mixture that z (n,) leads to; there (n,): where the second one may be met, to begin with."""
+    one = float(norm.logpdf(z, z.mean(), z.std()).sum()) + 0.5 * _PARAMETERS * float(np.log(len(z)))
+    share, apart, sd, nats = 0.0, 0.0, 0.0, -np.inf
     for _ in range(_ROUNDS):
         share = float(np.clip(there.mean(), 1e-3, _MOST))
-        middle, mean = (float(np.average(z, weights=weight + 1e-12)) for weight in (1 - there, there))
-        sd, other = (
-            float(np.sqrt(np.average((z - at) ** 2, weights=weight + 1e-12)))
-            for at, weight in ((middle, 1 - there), (mean, there))
-        )
-        other = max(other, 0.5 * sd)  # else a single moment would be infinitely likely
+        (middle, sd), (other, wide) = (_mean_and_sd(z, weights + 1e-12) for weights in (1 - there, there))
         usual = np.log1p(-share) + norm.logpdf(z, middle, sd)
-        rare = np.log(share) + norm.logpdf(z, mean, other)
-        there, density = expit(rare - usual), float(np.logaddexp(usual, rare).sum())
-    return there, density, share, mean - middle, sd
+        # No narrower than half of the first: else a single moment would be infinitely likely.
+        rare = np.log(share) + norm.logpdf(z, other, max(wide, 0.5 * sd))
+        there, nats, apart = expit(rare - usual), float(np.logaddexp(usual, rare).sum()) - one, other - middle
+    return _Mixture(nats, share, apart, sd, there)
+
+
+def _mean_and_sd(z: FloatArray, weights: FloatArray) -> tuple[float, float]:
+    """Return weighted mean and sd."""
+    mean = float(np.average(z, weights=weights))
+    return mean, float(np.sqrt(np.average((z - mean) ** 2, weights=weights)))
