@@ -15,8 +15,9 @@ from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experimen
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
 from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
+from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
-from kurumaisu.critic.ranges.scans.beams import gather, why_not_usable
+from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
 from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior, FormSearch
@@ -65,7 +66,7 @@ def criticise_scans(
         return LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
     question = _Question(recording, model, progress, ids)
     progress("laser: predicting the scans")
-    assembly = Assembly(gather(recording, model), ids)
+    assembly = Assembly(gather_stands(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
     if (far := large_effect(assembly.shots, ids)) is not None:

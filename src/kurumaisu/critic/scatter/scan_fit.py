@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
-from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
+from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise, own_pose_sds, pose_sds
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -19,16 +19,33 @@ _SOME = 4  # every so-manieth reading says how wide all are
 
 
 def basis_of(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArray]:
-    """Return (k, b, q) what readings do by a common mode and by errors of the poses, and their sds (k, q)."""
+    """Return (k, b, q) what readings do by a common mode and by errors of the poses, and their sds (k, q).
+
+    Of the poses first x, y, yaw of what is the same for all under a scan: what lasts, and in a stand there is no other.
+    """
     parts = [assembly.random_columns(k) for k in range(len(assembly.residual))]
     widest = max(part.shape[1] for part in parts)
     basis = np.zeros((len(parts), parts[0].shape[0], widest))
     size = np.full((len(parts), widest), 1e-6)
-    pose = np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], 1e-6)
+    whole, own = pose_sds(noise), own_pose_sds(noise)
+    lasting = np.sqrt(whole**2 - own**2)
     for k, part in enumerate(parts):
         basis[k, :, : part.shape[1]] = part
-        size[k, : part.shape[1]] = np.concatenate([[_COMMON], np.tile(pose, part.shape[1] // 3)])
-    return basis, size
+        shared = whole if assembly.layout.stand[k] >= 0 else lasting
+        size[k, : part.shape[1]] = np.concatenate([[_COMMON], shared, np.tile(own, part.shape[1] // 3 - 1)])
+    return basis, np.maximum(size, 1e-6)
+
+
+def drawn_errors(size: FloatArray, layout: Layout, tau: float, rng: np.random.Generator) -> FloatArray:
+    """Return errors (k, q) of sds (k, q) as of basis_of, of the poses alone; tau [s]: for which what lasts does so."""
+    draws = rng.standard_normal(size.shape)
+    kept = np.where(np.diff(layout.run) == 0, np.exp(-np.abs(np.diff(layout.times)) / tau), 0.0)
+    for k, rho in enumerate(kept.tolist(), 1):
+        draws[k, 1:4] = rho * draws[k - 1, 1:4] + np.sqrt(1 - rho**2) * draws[k, 1:4]
+    for stand in np.unique(layout.stand[layout.stand >= 0]):  # scans of one pose have its one error
+        draws[layout.stand == stand] = draws[np.flatnonzero(layout.stand == stand)[0]]
+    draws[:, 0] = 0.0
+    return draws * size
 
 
 def steepest(ranges: FloatArray, angles: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
-from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, fluctuating, steepest
+from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -75,6 +75,7 @@ class Statistics:
         self._farthest = assembly.shots.laser.range_max
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
+        self._layout, self._tau = assembly.layout, noise.lasting_tau
         self._stand = assembly.layout.stand
         self._basis, self._size = basis_of(assembly, noise)
         self._moved = assembly.moved
@@ -87,10 +88,7 @@ class Statistics:
 
     def pose_errors(self, rng: np.random.Generator) -> FloatArray:
         """Return errors of readings (k, b) [m] by errors of the reference, drawn."""
-        draws = rng.standard_normal(self._size.shape) * self._size
-        draws[:, 0] = 0.0
-        for stand in np.unique(self._stand[self._stand >= 0]):  # scans of one pose have its one error
-            draws[self._stand == stand] = draws[np.flatnonzero(self._stand == stand)[0]]
+        draws = drawn_errors(self._size, self._layout, self._tau, rng)
         return np.asarray((self._moves @ draws[:, :, np.newaxis])[:, :, 0])
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:

@@ -76,12 +76,18 @@ def estimate_reading_noise(
     # Of every reading that may ever count, outliers of the last round too.
     again = (left if np.array_equal(beam.valid, first.valid) else every) / sd
     valid = first.valid & (np.abs(np.nan_to_num(again)) < OUTLIER) & ~_jolted(again, first, layout)[:, np.newaxis]
-    both = beam.valid[:, 1:] & beam.valid[:, :-1] & (np.abs(z[:, 1:]) < OUTLIER) & (np.abs(z[:, :-1]) < OUTLIER)
-    a, b = z[:, 1:][both], z[:, :-1][both]
-    rho = float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
-    kept = np.where(beam.valid & (np.abs(z) < OUTLIER), left, np.nan)
+    inside = beam.valid & (np.abs(z) < OUTLIER)
+    rho = neighbours_correlation(z, inside)
+    kept = np.where(inside, left, np.nan)
     sd = sd * _repeated(grid, first.sd, sd, layout)
     return replace(beam, sd=sd, rho=rho, valid=valid, own_sd=_own_sd(kept, sd))
+
+
+def neighbours_correlation(z: FloatArray, use: BoolArray) -> float:
+    """Return how readings z (k, b) [sd] correlate with the next beam's, of those that are used (k, b); 0 at least."""
+    both = use[:, 1:] & use[:, :-1]
+    a, b = z[:, 1:][both], z[:, :-1][both]
+    return float(np.clip(a @ b / max(float(np.sqrt((a @ a) * (b @ b))), 1e-9), 0.0, 0.95))
 
 
 def _repeated(grid: float, noise: FloatArray, sd: FloatArray, layout: Layout) -> FloatArray:

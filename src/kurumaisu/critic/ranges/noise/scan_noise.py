@@ -23,6 +23,7 @@ _FLOOR = 1e-6  # [m, rad] below which no sd counts
 _USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
 _SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
+_STATED = 0.3  # of the log of a reference's sds, where somebody says them: a data sheet leaves out that it drifts
 _LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
 _WHOLE = 0.99  # of the largest common mode
 _NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
@@ -213,6 +214,22 @@ class CommonMode:
         return sizes, taus
 
 
+@dataclass(frozen=True)
+class _Usual:
+    """Logs of what of a ScanNoise is usual (6,), and their sds (6,)."""
+
+    logs: FloatArray
+    sds: FloatArray
+
+    @staticmethod
+    def of(truth: tuple[float, float] | None) -> _Usual:
+        """Return what is usual where somebody says how good the reference is, or nobody does."""
+        logs, sds = np.log(_USUAL), _SPREAD.copy()
+        if truth is not None:
+            logs[:2], sds[:2] = np.log(np.maximum(truth, _LOW[:2])), _STATED
+        return _Usual(logs, sds)
+
+
 class _Likelihood:
     """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
 
@@ -237,19 +254,16 @@ class _Likelihood:
 def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
     """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
 
-    The last common column is the residual. truth: known sd of the reference, else it is estimated too.
+    The last common column is the residual. truth: sds of the reference as somebody says, if anybody does.
     """
-    likelihood, start, known = _Likelihood(grams, layout, project), np.log(_USUAL), 0
-    if truth is not None:
-        start[:2], known = np.log(np.maximum(truth, 1e-5)), 2
-    none = np.where(np.arange(6) == 4, np.log(_NONE), start)
-    found = _likeliest(likelihood, none, np.arange(known, 4))
+    likelihood, usual = _Likelihood(grams, layout, project), _Usual.of(truth)
+    none = np.where(np.arange(6) == 4, np.log(_NONE), usual.logs)
+    found = _likeliest(likelihood, replace(usual, logs=none), np.arange(4))
     here = likelihood(found)
     lasting = min(_TRIED, key=lambda share: likelihood(replace(found, lasting=share)))
     if likelihood(replace(found, lasting=lasting)) > here:
         return found
-    begun = np.log(astuple(replace(found, lasting=lasting)))
-    return _likeliest(likelihood, start, np.arange(known, 6), begun[known:])
+    return _likeliest(likelihood, usual, np.arange(6), np.log(astuple(replace(found, lasting=lasting))))
 
 
 def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
@@ -309,29 +323,27 @@ def common_mode(
     values = np.maximum(values, 1 / np.max(_SPREAD[2:4]) ** 2)  # no less is known than before the data
     sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
     none = replace(noise, common_sd=max(own_sd, _FLOOR))
-    # Errors of the reference may stand in for it, where nobody knows them, and the model's own may last.
-    free = [*(range(2) if truth is None else ()), *([3] if own_sd else ())]
-    if free:
-        start = np.log(np.clip(astuple(none), _LOW, _HIGH))
-        none = _likeliest(likelihood, start, np.array(free))
+    # Errors of the reference may stand in for it, and the model's own may last.
+    usual = _Usual(np.log(np.clip(astuple(none), _LOW, _HIGH)), _Usual.of(truth).sds)
+    none = _likeliest(likelihood, usual, np.array([0, 1, *([3] if own_sd else ())]))
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
 
 def _likeliest(
-    likelihood: _Likelihood, start: FloatArray, free: IntArray, begin: FloatArray | None = None
+    likelihood: _Likelihood, usual: _Usual, free: IntArray, begin: FloatArray | None = None
 ) -> ScanNoise:
-    """Return the noise with some of its logs fitted, from `begin` or `start` on, the others as they are."""
+    """Return the noise with some of its logs fitted, from `begin` or what is usual on, the others as is usual."""
 
     def noise_at(values: FloatArray) -> ScanNoise:
-        every = start.copy()
+        every = usual.logs.copy()
         every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
         return ScanNoise(*(float(value) for value in np.exp(every)))
 
     def cost(values: FloatArray) -> float:
-        distance = (values - start[free]) / _SPREAD[free]
+        distance = (values - usual.logs[free]) / usual.sds[free]
         return likelihood(noise_at(values)) + 0.5 * float(distance @ distance)
 
-    at = start[free] if begin is None else begin
+    at = usual.logs[free] if begin is None else begin
     for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
         simplex = np.vstack([at, at + step * np.eye(len(at))])
         options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 100, "initial_simplex": simplex}

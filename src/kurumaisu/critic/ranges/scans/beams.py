@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +22,9 @@ MOST_SCANS = 250  # that are criticised, evenly taken from all: 170 000 readings
 _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
 RATES = ("v", "w")  # [m/s, rad/s] of the chair, by the reference
+_MOVE = 1e-3  # [m, rad] of a pose, to see how readings depend on it
+_GAP, _LONG = 0.3, 3.0  # [s], and usual times between poses, from which some are missing
+_STAYS = 0.02  # [m, rad] from pose to pose within which the chair may have stood meanwhile
 _ABOUT = 0.15  # [s] before and after a scan, between which its rates are taken
 
 
@@ -95,8 +99,11 @@ def _referred(run: Run) -> bool:
     return run.pose is not None and run.pose_source == "measured"
 
 
-def gather(recording: Recording, model: Model) -> Shots:
-    """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None."""
+def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[float]] = MappingProxyType({})) -> Shots:
+    """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None.
+
+    creeping: by run, times [s] in stands that are none.
+    """
     assert recording.world is not None
     laser = laser_of(model.laser, recording.laser, recording.runs)
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
@@ -109,7 +116,8 @@ def gather(recording: Recording, model: Model) -> Shots:
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
-        tracks.append(Track(*with_pause_rows(run.pose.t - zero, stands_averaged(run.pose.t, run.pose.values[:, :3]))))
+        still = stands_averaged(run.pose.t, run.pose.values[:, :3], creeping.get(run.name, ()))
+        tracks.append(Track(*with_pause_rows(run.pose.t - zero, still)))
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])
@@ -156,13 +164,22 @@ def time_zero(runs: Sequence[Run]) -> float:
 
 
 def _within(run: Run) -> IntArray:
-    """Return the scans of a run whose whole time lies within that of its poses."""
+    """Return the scans of a run whose whole time lies within that of its poses, and not where some are missing.
+
+    Over a gap that it drove through, nobody knows where the chair was.
+    """
     assert run.scan is not None
     if run.pose is None:
         return np.empty(0, dtype=np.int64)
-    slack = 0.1  # [s] of extrapolation at the ends
-    inside = (run.scan.t >= run.pose.t[0] - slack) & (run.scan.t <= run.pose.t[-1] + slack)
-    return np.asarray(np.flatnonzero(inside & np.isfinite(run.scan.values).any(axis=1)))
+    slack = 0.1  # [s] of extrapolation at the ends, and that a scan takes
+    scans, times, poses = run.scan.t, run.pose.t, run.pose.values[:, :3]
+    inside = (scans >= times[0] - slack) & (scans <= times[-1] + slack) & np.isfinite(run.scan.values).any(axis=1)
+    steps = np.diff(times)
+    moved = np.abs(geometry.between(poses[:-1], poses[1:])).max(axis=1, initial=0.0) > _STAYS
+    gaps = np.r_[False, moved & (steps > np.maximum(_GAP, _LONG * np.median(steps) if len(steps) else 0.0)), False]
+    for when in (scans, scans + slack):
+        inside &= ~gaps[np.searchsorted(times, when, side="right")]
+    return np.asarray(np.flatnonzero(inside))
 
 
 def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
@@ -283,6 +300,22 @@ def predict(
     chain = effects.build_laser(shaping, np.random.default_rng(seed))
     mean = read(shots, seen, chain, np.full_like(seen.ranges, noise))
     return np.where(np.isfinite(mean), mean, np.nan)
+
+
+def moved_by_pose(shots: Shots, seen: BeamHits, base: FloatArray | None = None) -> FloatArray:
+    """Return the change (k, b, 3) of the mean readings per metre and radian of the pose; 0 where nothing is met.
+
+    seen: what is met; base (k, b) [m]: what is read of it, where one side of a difference will do.
+    """
+    out = []
+    for axis in np.eye(3):
+        signs = (-1.0, 1.0) if base is None else (1.0,)
+        moved = [] if base is None else [base]
+        for sign in signs:
+            hits = hits_of(shots, (), 0, shift=sign * axis * _MOVE, like=seen)
+            moved.append(predict(shots, (), hits, 0))
+        out.append((moved[1] - moved[0]) / (len(signs) * _MOVE))
+    return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
 def thin(shots: Shots, most: int) -> Shots:

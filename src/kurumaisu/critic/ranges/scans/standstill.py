@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from kurumaisu.critic.values.robust import third_difference_sd
@@ -17,8 +19,10 @@ _MOSTLY = 0.5  # share of what might be a stand that is one: of a slow drive som
 _OFF = 4.0  # sds of the jitter by which poses at the ends of a stand are off where the chair still rolls, or does again
 
 
-def stands_averaged(times: FloatArray, poses: FloatArray) -> FloatArray:
+def stands_averaged(times: FloatArray, poses: FloatArray, creeping: Sequence[float] = ()) -> FloatArray:
     """Return poses (n, 3), those of each stand replaced by their mean; times (n,) [s].
+
+    creeping: times [s] in stands that are none.
 
     A reference errs alike while the chair stands. Taken for so many independent poses it would seem to be far better
     known than it is. One scan taken while the chair rolls out would be off by all that it rolls.
@@ -33,6 +37,8 @@ def stands_averaged(times: FloatArray, poses: FloatArray) -> FloatArray:
     out = poses.copy()
     for rows in np.split(np.arange(len(times)), cuts):
         still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
+        if len(still) and any(times[still[0]] <= t <= times[still[-1]] for t in creeping):
+            continue
         if len(still) >= max(_FEWEST, _MOSTLY * len(rows)) and _stands(poses[still], jitter):
             out[still] = poses[still].mean(axis=0)
     return out

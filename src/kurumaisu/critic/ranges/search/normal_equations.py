@@ -29,7 +29,7 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
 )
 from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence
 from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
-from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, model_effects_with, predict, some_scans
+from kurumaisu.critic.ranges.scans.beams import Shots, model_effects_with, moved_by_pose, predict, some_scans
 from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
 from kurumaisu.critic.ranges.scans.map_changes import map_change
 from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
@@ -43,7 +43,6 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_MOVE = np.array([1e-3, 1e-3, 1e-3])  # [m, m, rad] of a pose, to see how readings depend on it
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _ROUNDS = 3
 _SHIFTS = 2  # times that poses are sought by the scans
@@ -107,7 +106,7 @@ class Assembly:
         """
         self.shots = shots
         self.marks = EffectColumns(shots)
-        self.poses = self._by_pose((1.0,) if roughly else (-1.0, 1.0))
+        self.poses = moved_by_pose(shots, self.marks.seen, self.marks.base if roughly else None)
         self.moved = np.einsum("kbi,kbi->kb", self.poses, shots.shift)  # (k, b) [m] by errors of the reference
         self.residual = unrounded(shots.measured) - self.marks.base + self.moved
 
@@ -363,25 +362,17 @@ class Assembly:
         return own, np.hstack([one, poses]) if lasting else one, last
 
     def random_columns(self, k: int) -> FloatArray:
-        """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses."""
-        own, shared, _ = self._rows(k, None)
-        return np.hstack([shared[:, :1], own, shared[:, 1:]])
+        """Return (b, q) what the readings of a scan do by its common mode and by errors of its reference poses.
+
+        Three for what those errors have in common, x, y, yaw, then three for each of them.
+        """
+        own, shared, _ = self._rows(k, np.arange(0), lasting=True)
+        return np.hstack([shared, own])
 
     def origins(self) -> tuple[FloatArray, FloatArray]:
         """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
         seen = self.marks.seen
         return seen.origins, np.array([each.bearings for each in seen.beams])
-
-    def _by_pose(self, signs: Sequence[float]) -> FloatArray:
-        """Return the change (k, b, 3) of the mean readings per metre and radian of the pose."""
-        out = []
-        for axis in range(3):
-            moved = [self.marks.base] if len(signs) == 1 else []
-            for sign in signs:
-                seen = hits_of(self.shots, (), 0, shift=sign * np.eye(3)[axis] * _MOVE, like=self.marks.seen)
-                moved.append(predict(self.shots, (), seen, 0))
-            out.append((moved[1] - moved[0]) / (len(signs) * _MOVE[axis]))
-        return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
 def _pose_evidence(gram: Gram, rows: slice, width: float) -> PoseEvidence:
