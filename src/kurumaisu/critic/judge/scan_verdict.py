@@ -15,6 +15,7 @@ from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experimen
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
 from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
+from kurumaisu.critic.ranges.noise.scan_noise import pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
@@ -223,11 +224,12 @@ def _confused(assembly: Assembly, normal: NormalEquations, made: MeanEffects, ca
 
 def _noise_sentences(assembly: Assembly, normal: NormalEquations) -> str:
     noise, beam = normal.scan_noise, normal.beam_noise
+    position_sd, _, heading_sd = pose_sds(noise).tolist()
     return (
         f"laser: {normal.readings} readings of {len(assembly.shots.stamps)} scans. Noise: neighbours correlate by "
         f"{beam.rho:.2f}, whole scans {1e3 * noise.common_sd:.2g} mm over {noise.common_tau:.2g} s, "
-        f"single beams {1e3 * beam.own_sd:.2g} mm, reference {1e3 * noise.position_sd:.2g} mm and "
-        f"{1e3 * noise.heading_sd:.2g} mrad."
+        f"single beams {1e3 * beam.own_sd:.2g} mm, reference {1e3 * position_sd:.2g} mm and "
+        f"{1e3 * heading_sd:.2g} mrad."
     )
 
 

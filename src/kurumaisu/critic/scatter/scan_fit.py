@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
-from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise, own_pose_sds, pose_sds
+from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -27,12 +29,10 @@ def basis_of(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArr
     widest = max(part.shape[1] for part in parts)
     basis = np.zeros((len(parts), parts[0].shape[0], widest))
     size = np.full((len(parts), widest), 1e-6)
-    whole, own = pose_sds(noise), own_pose_sds(noise)
-    lasting = np.sqrt(whole**2 - own**2)
+    plausible = replace(noise, common_sd=_COMMON)
     for k, part in enumerate(parts):
         basis[k, :, : part.shape[1]] = part
-        shared = whole if assembly.layout.stand[k] >= 0 else lasting
-        size[k, : part.shape[1]] = np.concatenate([[_COMMON], shared, np.tile(own, part.shape[1] // 3 - 1)])
+        size[k, : part.shape[1]] = assembly.random_sds(k, plausible)
     return basis, np.maximum(size, 1e-6)
 
 

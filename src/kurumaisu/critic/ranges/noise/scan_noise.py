@@ -18,16 +18,19 @@ from scipy.optimize import minimize, minimize_scalar
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FLOOR = 1e-6  # [m, rad] below which no sd counts
-# Of position [m], heading [rad], common mode [m], its time constant [s], the share of the poses' errors that lasts and
-# how long [s]: what is usual, the sd of its log, bounds.
-_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.05, 5.0])
+# Of position [m], heading [rad], common mode [m], its time constant [s], how large errors of the poses that last are
+# and how long they do [s]: what is usual, the sd of its log, bounds.
+_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.25, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
-_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 2.0, 1.0])
-_STATED = 0.3  # of the log of a reference's sds, where somebody says them: a data sheet leaves out that it drifts
-_LOW, _HIGH = np.array([1e-5, 1e-5, 1e-6, 0.01, 1e-4, 1.0]), np.array([0.3, 0.3, 0.1, 10.0, 0.98, 60.0])
+_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 1.0, 1.0])
+_LOW = np.array([1e-5, 1e-5, 1e-6, 0.01, 0.01, 1.0])
+_HIGH = np.array([0.3, 0.3, 0.1, 10.0, 7.0, 60.0])
+# Where somebody says how good a reference is, the log of what each pose errs by itself is within this, 1 sd, and it is
+# no more than so many times as large. That it wanders, a data sheet leaves out.
+_STATED, _LOUDER = 0.3, 1.5
 _WHOLE = 0.99  # of the largest common mode
-_NONE = 0.003  # share that lasts of a reference that does not wander, as far as can be seen
-_TRIED = (0.05, 0.2, 0.6)  # shares, one of which must be likelier
+_NONE = 0.05  # how much of a reference's errors lasts that does not wander, as far as can be seen
+_TRIED = (0.25, 0.5, 1.2)  # how much of them, one of which must be likelier
 _STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
 _STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
 _WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
@@ -41,9 +44,9 @@ _APART = 0.2  # in logs, to see how surely each is known
 class ScanNoise:
     """Errors that the readings of a scan share.
 
-    position_sd [m], heading_sd [rad]: of a reference pose; common_sd [m]: of the offset of a scan, whose correlation
-    with the next one falls off with a time constant common_tau [s]; lasting: share of the poses' variance that falls
-    off with lasting_tau [s], as of a reference that wanders: the rest is each pose's own.
+    position_sd [m], heading_sd [rad]: of each reference pose alone; common_sd [m]: of the offset of a scan, whose
+    correlation with the next one falls off with a time constant common_tau [s]; lasting: how many times as large as
+    the poses' own errors are those whose correlation falls off with lasting_tau [s], as of a reference that wanders.
     """
 
     position_sd: float
@@ -77,7 +80,7 @@ class Layout:
 
     def kept(self, noise: ScanNoise) -> tuple[FloatArray, float]:
         """Return the precision of the errors of stands and stretches, x, y, yaw in turn, and its log determinant."""
-        lasting = np.maximum(np.sqrt(noise.lasting) * pose_sds(noise), _FLOOR) ** -2
+        lasting = np.maximum(noise.lasting * own_pose_sds(noise), _FLOOR) ** -2
         runs, middles = self._stretches[0].T
         along, log_det = autoregressive(middles, runs, noise.lasting_tau)
         stands = np.diag(np.tile(pose_sds(noise) ** -2, self._stands))
@@ -145,12 +148,12 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 
 def pose_sds(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of a reference pose."""
-    return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
+    return np.asarray(np.hypot(1.0, noise.lasting) * own_pose_sds(noise))
 
 
 def own_pose_sds(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of what of a reference pose's error is its own."""
-    return np.asarray(np.sqrt(1 - noise.lasting) * pose_sds(noise))
+    return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
 
 
 def _alike(grams: Sequence[Gram]) -> list[list[int]]:
@@ -216,18 +219,20 @@ class CommonMode:
 
 @dataclass(frozen=True)
 class _Usual:
-    """Logs of what of a ScanNoise is usual (6,), and their sds (6,)."""
+    """Logs of what of a ScanNoise is usual (6,), their sds (6,), and the most they may be (6,)."""
 
     logs: FloatArray
     sds: FloatArray
+    most: FloatArray
 
     @staticmethod
     def of(truth: tuple[float, float] | None) -> _Usual:
         """Return what is usual where somebody says how good the reference is, or nobody does."""
-        logs, sds = np.log(_USUAL), _SPREAD.copy()
+        logs, sds, most = np.log(_USUAL), _SPREAD.copy(), np.log(_HIGH)
         if truth is not None:
             logs[:2], sds[:2] = np.log(np.maximum(truth, _LOW[:2])), _STATED
-        return _Usual(logs, sds)
+            most[:2] = logs[:2] + np.log(_LOUDER)
+        return _Usual(logs, sds, most)
 
 
 class _Likelihood:
@@ -260,7 +265,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     none = np.where(np.arange(6) == 4, np.log(_NONE), usual.logs)
     found = _likeliest(likelihood, replace(usual, logs=none), np.arange(4))
     here = likelihood(found)
-    lasting = min(_TRIED, key=lambda share: likelihood(replace(found, lasting=share)))
+    lasting = min(_TRIED, key=lambda size: likelihood(replace(found, lasting=size)))
     if likelihood(replace(found, lasting=lasting)) > here:
         return found
     return _likeliest(likelihood, usual, np.arange(6), np.log(astuple(replace(found, lasting=lasting))))
@@ -324,7 +329,7 @@ def common_mode(
     sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
     none = replace(noise, common_sd=max(own_sd, _FLOOR))
     # Errors of the reference may stand in for it, and the model's own may last.
-    usual = _Usual(np.log(np.clip(astuple(none), _LOW, _HIGH)), _Usual.of(truth).sds)
+    usual = replace(_Usual.of(truth), logs=np.log(np.clip(astuple(none), _LOW, _HIGH)))
     none = _likeliest(likelihood, usual, np.array([0, 1, *([3] if own_sd else ())]))
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
@@ -336,7 +341,7 @@ def _likeliest(
 
     def noise_at(values: FloatArray) -> ScanNoise:
         every = usual.logs.copy()
-        every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
+        every[free] = np.clip(values, np.log(_LOW)[free], usual.most[free])
         return ScanNoise(*(float(value) for value in np.exp(every)))
 
     def cost(values: FloatArray) -> float:

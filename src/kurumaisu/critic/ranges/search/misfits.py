@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.critic.ranges.noise.scan_noise import pose_sds
 from kurumaisu.critic.ranges.search.effect_sets import FormPosterior
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained
@@ -60,11 +61,10 @@ def _moments(assembly: Assembly, rows: IntArray) -> Moments:
 def _without_shared_errors(assembly: Assembly, normal: NormalEquations, error: FloatArray) -> FloatArray:
     """Return errors (k, b) [m] without what is most likely an error of the reference or of the whole scan."""
     scan, beam = normal.scan_noise, normal.beam_noise
-    pose = np.maximum([scan.position_sd, scan.position_sd, scan.heading_sd], _LEAST)
     out = error.copy()
     for k, valid in enumerate(beam.valid):
         shared = assembly.random_columns(k)
-        size = np.concatenate([[max(scan.common_sd, _LEAST)], np.tile(pose, shared.shape[1] // 3)])
+        size = np.maximum(assembly.random_sds(k, scan), _LEAST)
         use = valid & np.isfinite(error[k])
         white = shared[use] / beam.sd[k][use, np.newaxis]
         target = white.T @ (error[k][use] / beam.sd[k][use])
@@ -93,13 +93,14 @@ def alternatives(found: FormPosterior) -> tuple[Alternative, ...]:
 def noise_rows(normal: NormalEquations) -> tuple[NoiseParameter, ...]:
     """Return the noise of the scans."""
     scan, beam = normal.scan_noise, normal.beam_noise
+    position_sd, _, heading_sd = pose_sds(scan).tolist()
     rows = (
         ("laser: single reading (median)", float(np.median(beam.sd[beam.valid])), "m"),
         ("laser: correlation of neighbouring readings", beam.rho, "1"),
         ("laser: error common to a whole scan", scan.common_sd, "m"),
         ("laser: time constant of the common error", scan.common_tau, "s"),
-        ("reference position at the scans, each axis", scan.position_sd, "m"),
-        ("reference heading at the scans", scan.heading_sd, "rad"),
+        ("reference position at the scans, each axis", position_sd, "m"),
+        ("reference heading at the scans", heading_sd, "rad"),
     )
     return tuple(NoiseParameter(name, value, _NAN, _NAN, unit) for name, value, unit in rows)
 

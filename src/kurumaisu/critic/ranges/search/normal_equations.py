@@ -24,6 +24,8 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
     common_mode,
     estimate,
     marginal,
+    own_pose_sds,
+    pose_sds,
     whitened,
     with_lasting_common_mode,
 )
@@ -368,6 +370,13 @@ class Assembly:
         """
         own, shared, _ = self._rows(k, np.arange(0), lasting=True)
         return np.hstack([shared, own])
+
+    def random_sds(self, k: int, noise: ScanNoise) -> FloatArray:
+        """Return the sds (q,) [m, rad] of what random_columns are of."""
+        own = own_pose_sds(noise)
+        shared = pose_sds(noise) if self.layout.stand[k] >= 0 else noise.lasting * own
+        count = 0 if self.layout.stand[k] >= 0 else self.hats[k].weights.shape[1]
+        return np.concatenate([[noise.common_sd], shared, np.tile(own, count)])
 
     def origins(self) -> tuple[FloatArray, FloatArray]:
         """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
