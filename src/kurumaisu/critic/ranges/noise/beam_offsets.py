@@ -7,9 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
 
-from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, own_pose_sds, precision
+from kurumaisu.critic.ranges.noise.scan_noise import (
+    Gram,
+    Layout,
+    ScanNoise,
+    banded,
+    gathered,
+    own_pose_sds,
+    precision,
+)
 from kurumaisu.types import BoolArray, FloatArray
 
 _FLOOR = 1e-7  # [m] below which no sd of the beams' offsets counts
@@ -50,37 +58,37 @@ def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: flo
 def without_beam_offsets(
     grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
-    """Return normal equations as scan_noise.marginal does, offsets of beams of sd beam_sd [m] integrated out too."""
+    """Return normal equations as scan_noise.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
+
+    All grams share as many errors with others.
+    """
     size, beams = own_pose_sds(noise), len(cross.inner)
-    prior = precision(layout, noise)[0]
-    scans, shared = len(grams), len(prior)
-    common = cross.common.shape[1]
-    inner = np.zeros((shared + beams, shared + beams))
-    outer = np.zeros((shared + beams, common))
-    total = np.zeros((common, common))
-    inner[shared:, shared:] = cross.inner
-    outer[shared:] = cross.common
+    common, pose, shared = layout.nodes
+    outer = cross.common.copy()
+    inner, total = cross.inner + max(beam_sd, _FLOOR) ** -2 * np.eye(beams), np.zeros((outer.shape[1], outer.shape[1]))
     taken: list[tuple[FloatArray, FloatArray]] = []
+    within, beside = [], []  # of the errors that scans share, and beside them: beams' offsets, then the common columns
     for k, gram in enumerate(grams):
-        own, lead = gram.own, gram.shared
-        index = [k, *(scans + 3 * layout.places[k] + i for i in range(lead - 1))]
-        rest, beside = gram.matrix[own : own + lead, own:], cross.own[k][:, own:]
+        own, lead = gram.own, gram.own + gram.shared
+        rest, offsets = gram.matrix[own:lead, own:], cross.own[k][:, own:]
         if own:
             part, columns = _of_own(gram, cross.own[k], size)
-            rest, beside = rest - columns[:, :lead].T @ columns, beside - part.T @ columns[:, :lead]
-            taken.append((part, columns[:, lead:]))
-        inner[np.ix_(index, index)] += rest[:, :lead]
-        inner[shared:, index] += beside
-        outer[index] += rest[:, lead:]
-        total += gram.matrix[own + lead :, own + lead :]
+            rest, offsets = rest - columns[:, : gram.shared].T @ columns, offsets - part.T @ columns[:, : gram.shared]
+            taken.append((part, columns[:, gram.shared :]))
+        within.append(rest[:, : gram.shared])
+        beside.append(np.hstack([offsets.T, rest[:, gram.shared :]]))
+        total += gram.matrix[lead:, lead:]
     if taken:  # all at once: one product of large matrices instead of many of small ones
         parts, columns = (np.concatenate(each) for each in zip(*taken, strict=True))
-        inner[shared:, shared:] -= parts.T @ parts
-        outer[shared:] -= parts.T @ columns
+        inner -= parts.T @ parts
+        outer -= parts.T @ columns
         total -= columns.T @ columns
-    inner[:shared, shared:] = inner[shared:, :shared].T
-    inner[:shared, :shared] += prior
-    inner[range(shared, len(inner)), range(shared, len(inner))] += max(beam_sd, _FLOOR) ** -2
+    index = np.column_stack([common, pose[:, np.newaxis] + np.arange(len(within[0]) - 1)])
+    band = precision(layout, noise)[0]
+    factor = cholesky_banded(band + banded(index, np.array(within), band.shape), lower=True)
+    every = gathered(index, np.array(beside), shared)
+    left = every.T @ cho_solve_banded((factor, True), every)
+    inner, outer, total = inner - left[:beams, :beams], outer - left[:beams, beams:], total - left[beams:, beams:]
     return np.asarray(total - outer.T @ cho_solve(cho_factor(inner), outer))
 
 

@@ -12,8 +12,9 @@ from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag, cho_factor, cho_solve
+from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.optimize import minimize, minimize_scalar
+from scipy.sparse import coo_array
 
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -31,8 +32,6 @@ _STATED, _LOUDER = 0.3, 1.5
 _WHOLE = 0.99  # of the largest common mode
 _NONE = 0.05  # how much of a reference's errors lasts that does not wander, as far as can be seen
 _TRIED = (0.25, 0.5, 1.2)  # how much of them, one of which must be likelier
-_STRETCH = 2.0  # [s] of the way, at least, on which errors of the poses that last are one
-_STRETCHES = 40  # at most, and one more for each run: where scans are so far apart, what lasts less long hardly counts
 _WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
 _CERTAIN = 5.0  # [nat] from which there is a common mode
 _UNLIKELY = 0.01  # times as likely as the likeliest, below which no longer one counts
@@ -66,30 +65,33 @@ class Layout:
     stand: IntArray
 
     @cached_property
-    def places(self) -> IntArray:
-        """Which error of a pose that several scans share each scan (k,) has: its stand's, then its stretch's."""
-        return np.asarray(np.where(self.stand >= 0, self.stand, self._stands + self._stretches[1]))
+    def nodes(self) -> tuple[IntArray, IntArray, int]:
+        """Return which of the errors that scans share are each scan's (k,): its common mode, its pose; and their count.
+
+        Of a pose the first of three, x, y, yaw: of a stand all its scans' own, else what lasts of the errors until this
+        scan. In the order of the scans, so that only near ones have to do with each other.
+        """
+        common, pose, count = np.empty(len(self.times), dtype=np.int64), np.empty(len(self.times), dtype=np.int64), 0
+        known: dict[int, int] = {}
+        for k, stand in enumerate(self.stand.tolist()):
+            pose[k] = known.get(stand, count) if stand >= 0 else count
+            if pose[k] == count:
+                known[stand] = count
+                count += 3
+            common[k], count = count, count + 1
+        return common, pose, count
 
     @cached_property
-    def _stretches(self) -> tuple[FloatArray, IntArray]:
-        """Run and middle [s] (m, 2) of all stretches, and of which each scan (k,) is."""
-        driven = sum(float(np.ptp(self.times[self.run == run])) for run in np.unique(self.run))
-        length = max(_STRETCH, driven / _STRETCHES)
-        found, of = np.unique(np.column_stack([self.run, np.floor(self.times / length)]), axis=0, return_inverse=True)
-        return np.column_stack([found[:, 0], length * (found[:, 1] + 0.5)]), of.ravel()
+    def moving(self) -> IntArray:
+        """Return the scans that were not taken in a stand."""
+        return np.flatnonzero(self.stand < 0)
 
-    def kept(self, noise: ScanNoise) -> tuple[FloatArray, float]:
-        """Return the precision of the errors of stands and stretches, x, y, yaw in turn, and its log determinant."""
-        lasting = np.maximum(noise.lasting * own_pose_sds(noise), _FLOOR) ** -2
-        runs, middles = self._stretches[0].T
-        along, log_det = autoregressive(middles, runs, noise.lasting_tau)
-        stands = np.diag(np.tile(pose_sds(noise) ** -2, self._stands))
-        logs = self._stands * np.log(pose_sds(noise) ** -2).sum() + 3 * log_det + len(middles) * np.log(lasting).sum()
-        return block_diag(stands, np.kron(along, np.diag(lasting))), float(logs)
-
-    @property
-    def _stands(self) -> int:
-        return int(self.stand.max(initial=-1)) + 1
+    @cached_property
+    def reach(self) -> int:
+        """How far apart two errors are at most, in their order, that have to do with each other."""
+        common, pose, _ = self.nodes
+        steps = [np.diff(common), np.abs(common - pose) + 2, np.diff(pose[self.moving]), np.array([3])]
+        return int(max(step.max(initial=0) for step in steps))
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,8 @@ class Gram:
     """Normal equations of one scan, whitened within the scan.
 
     own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
-    follow, one for its common mode and three for the error of its stand's pose or, where asked for, of its stretch; the
-    rest are common to all scans.
+    follow, one for its common mode and three for the error of its stand's pose or, where asked for, for what lasts of
+    its poses' errors; the rest are common to all scans.
     """
 
     matrix: FloatArray
@@ -124,26 +126,97 @@ def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[F
 
     The latter is that of the covariance, relative to independent readings.
     """
-    size = own_pose_sds(noise)
-    prior, prior_log_det = precision(layout, noise)
-    scans = len(grams)
-    common = len(grams[0].matrix) - grams[0].own - grams[0].shared
-    inner = np.zeros_like(prior)
-    cross = np.zeros((len(inner), common))
-    total = np.zeros((common, common))
-    log_det = 0.0
-    for rows in _alike(grams):
-        rest, more = _without_own(np.array([grams[k].matrix for k in rows]), grams[rows[0]].own, size)
-        log_det += more
-        lead = grams[rows[0]].shared
-        total += rest[:, lead:, lead:].sum(axis=0)
-        kept = scans + 3 * layout.places[rows, np.newaxis] + np.arange(lead - 1)
-        index = np.column_stack([rows, kept])
-        np.add.at(inner, (index[:, :, np.newaxis], index[:, np.newaxis]), rest[:, :lead, :lead])
-        np.add.at(cross, index, rest[:, :lead, lead:])
-    factor = cho_factor(inner + prior)
-    log_det += 2 * float(np.log(np.diag(factor[0])).sum()) - prior_log_det
-    return total - cross.T @ cho_solve(factor, cross), log_det
+    return _Stacked(grams, layout).marginal(noise)
+
+
+class _Stacked:
+    """Grams in a few large arrays, for noises to be tried on."""
+
+    def __init__(self, grams: Sequence[Gram], layout: Layout) -> None:
+        self._layout = layout
+        groups: dict[tuple[int, int], list[int]] = {}
+        for k, gram in enumerate(grams):
+            groups.setdefault((gram.own, gram.shared), []).append(k)
+        self._parts = [
+            _Part(np.array([grams[k].matrix for k in rows]), own, shared, self._index(np.array(rows), shared))
+            for (own, shared), rows in groups.items()
+        ]
+
+    def _index(self, rows: IntArray, shared: int) -> IntArray:
+        """Return of which of the errors that scans share (n, shared) these scans have theirs."""
+        common, pose, _ = self._layout.nodes
+        return np.column_stack([common[rows], pose[rows, np.newaxis] + np.arange(shared - 1)])
+
+    def marginal(self, noise: ScanNoise) -> tuple[FloatArray, float]:
+        """Return what marginal does."""
+        band, prior_log_det = precision(self._layout, noise)
+        cross, total, log_det = 0.0, 0.0, -prior_log_det
+        for part in self._parts:
+            within, beside, rest, more = part.without_own(own_pose_sds(noise))
+            log_det += more
+            total = total + rest
+            band += banded(part.index, within, band.shape)
+            cross = cross + gathered(part.index, beside, band.shape[1])
+        factor = cholesky_banded(band, lower=True)
+        log_det += 2 * float(np.log(factor[0]).sum())
+        return total - cross.T @ cho_solve_banded((factor, True), cross), log_det
+
+
+def banded(index: IntArray, parts: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Return symmetric parts (n, s, s), whose rows and columns are index (n, s), added up, as a lower band of a shape."""
+    below = index[:, :, np.newaxis] - index[:, np.newaxis]
+    use = below >= 0
+    flat = (below * shape[1] + index[:, np.newaxis])[use]
+    return np.bincount(flat, parts[use], shape[0] * shape[1]).reshape(shape)
+
+
+def gathered(index: IntArray, parts: FloatArray, count: int) -> FloatArray:
+    """Return parts (n, s, c), whose rows are index (n, s), added up (count, c)."""
+    places = coo_array((np.ones(index.size), (index.ravel(), np.arange(index.size))), (count, index.size))
+    return np.asarray(places @ parts.reshape(index.size, -1))
+
+
+class _Part:
+    """Grams (n, m, m) of the same parts; index (n, shared): of which errors that scans share each has its own."""
+
+    def __init__(self, matrices: FloatArray, own: int, shared: int, index: IntArray) -> None:
+        lead = own + shared
+        self.index = index
+        self._own, self._outer = matrices[:, :own, :own], np.ascontiguousarray(matrices[:, :own, own:])
+        self._within, self._beside = matrices[:, own:lead, own:lead], matrices[:, own:lead, lead:]
+        self._rest = matrices[:, lead:, lead:].sum(axis=0)
+
+    def without_own(self, size: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Return parts of the grams when errors of sds size (3,) of their own poses are integrated out.
+
+        (n, shared, shared) within what is shared, (n, shared, c) beside the common columns, (c, c) of these, and a log
+        determinant.
+        """
+        own, shared = self._own.shape[1], self.index.shape[1]
+        if own == 0:
+            return self._within, self._beside, self._rest, 0.0
+        scale = np.tile(size, own // 3)
+        inner = self._own * np.outer(scale, scale) + np.eye(own)
+        lower = np.linalg.cholesky(inner)
+        root = (_inverse(lower) * scale) @ self._outer
+        log_det = 2 * float(np.log(np.diagonal(lower, axis1=1, axis2=2)).sum())
+        lead, common = root[:, :, :shared].transpose(0, 2, 1), root[:, :, shared:]
+        flat = common.reshape(-1, common.shape[2])
+        return (
+            self._within - lead @ root[:, :, :shared],
+            self._beside - lead @ common,
+            self._rest - flat.T @ flat,
+            log_det,
+        )
+
+
+def _inverse(lower: FloatArray) -> FloatArray:
+    """Return the inverses of many small lower triangles (n, q, q), a row of all at a time."""
+    out = np.zeros_like(lower)
+    for i in range(lower.shape[1]):
+        out[:, i, i] = 1 / lower[:, i, i]
+        out[:, i, :i] = -np.einsum("nj,njk->nk", lower[:, i, :i], out[:, :i, :i]) * out[:, i, i, np.newaxis]
+    return out
 
 
 def pose_sds(noise: ScanNoise) -> FloatArray:
@@ -156,43 +229,36 @@ def own_pose_sds(noise: ScanNoise) -> FloatArray:
     return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], _FLOOR)
 
 
-def _alike(grams: Sequence[Gram]) -> list[list[int]]:
-    """Return the scans whose grams have the same parts, together."""
-    groups: dict[tuple[int, int], list[int]] = {}
-    for k, gram in enumerate(grams):
-        groups.setdefault((gram.own, gram.shared), []).append(k)
-    return list(groups.values())
-
-
-def _without_own(matrices: FloatArray, own: int, size: FloatArray) -> tuple[FloatArray, float]:
-    """Return the rest (n, m, m) of grams when errors of their own poses are integrated out, and a log determinant."""
-    if own == 0:
-        return matrices, 0.0
-    scale = np.tile(size, own // 3)
-    inner = matrices[:, :own, :own] * np.outer(scale, scale) + np.eye(own)
-    cross = matrices[:, :own, own:] * scale[:, np.newaxis]
-    rest = matrices[:, own:, own:] - cross.transpose(0, 2, 1) @ np.linalg.solve(inner, cross)
-    return rest, float(np.linalg.slogdet(inner)[1].sum())
-
-
 def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
-    """Return the precision of common modes, autoregressive within a run, and kept errors; and its log determinant."""
-    sd = max(noise.common_sd, _FLOOR)
-    common, log_det = autoregressive(layout.times, layout.run, noise.common_tau)
-    kept, more = layout.kept(noise)
-    return block_diag(common / sd**2, kept), log_det - 2 * len(common) * float(np.log(sd)) + more
+    """Return the precision of the errors that scans share, as a lower band (reach + 1, n), and its log determinant.
+
+    Common modes and what lasts of the poses' errors follow the last ones of a run; stands have errors of their own.
+    """
+    common, pose, count = layout.nodes
+    band = np.zeros((layout.reach + 1, count))
+    every = np.arange(len(common))
+    log_det = _chain(band, layout, every, common, max(noise.common_sd, _FLOOR), noise.common_tau)
+    lasting = np.maximum(noise.lasting * own_pose_sds(noise), _FLOOR)
+    stands = np.unique(pose[layout.stand >= 0])
+    for axis, (slow, whole) in enumerate(zip(lasting.tolist(), pose_sds(noise).tolist(), strict=True)):
+        log_det += _chain(band, layout, layout.moving, pose[layout.moving] + axis, slow, noise.lasting_tau)
+        band[0, stands + axis] += whole**-2
+        log_det -= 2 * len(stands) * float(np.log(whole))
+    return band, log_det
 
 
-def autoregressive(times: FloatArray, run: IntArray | FloatArray, tau: float) -> tuple[FloatArray, float]:
-    """Return the precision (n, n) of unit errors that fall off with tau [s] within a run, and its log determinant."""
-    n = len(times)
+def _chain(band: FloatArray, layout: Layout, rows: IntArray, at: IntArray, sd: float, tau: float) -> float:
+    """Add the precision of errors of an sd that fall off with tau [s] within a run, and return its log determinant.
+
+    rows: of scans; at: where each has its error.
+    """
+    times, run = layout.times[rows], layout.run[rows]
     rho = np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
-    innovation = np.maximum(np.concatenate([[1.0], 1 - rho**2]), 1e-9)  # variances
-    diagonal = 1 / innovation
-    diagonal[:-1] += rho**2 / innovation[1:]
-    out = np.diag(diagonal)
-    out[range(n - 1), range(1, n)] = out[range(1, n), range(n - 1)] = -rho / innovation[1:]
-    return out, -float(np.log(innovation).sum())
+    innovation = sd**2 * np.maximum(np.concatenate([np.ones(min(len(rows), 1)), 1 - rho**2]), 1e-9)  # variances
+    band[0, at] += 1 / innovation
+    band[0, at[:-1]] += rho**2 / innovation[1:]
+    band[np.diff(at), at[:-1]] -= rho / innovation[1:]
+    return -float(np.log(innovation).sum())
 
 
 @dataclass(frozen=True)
@@ -240,15 +306,16 @@ class _Likelihood:
 
     def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
         """Take common columns to project out; the last common column is the residual."""
-        self._grams, self._layout = [_only(gram, project) for gram in grams], layout
+        chosen = [_only(gram, project) for gram in grams]
+        self._stacked = _Stacked(chosen, layout)
         # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
         # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
         # more noise.
-        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in self._grams)
+        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in chosen)
         self._norms = np.sqrt(np.maximum(each, 1e-300))
 
     def __call__(self, noise: ScanNoise) -> float:
-        s, log_det = marginal(self._grams, self._layout, noise)
+        s, log_det = self._stacked.marginal(noise)
         yy = float(s[-1, -1])
         x = s[:-1, :-1] / np.outer(self._norms, self._norms) + _WEAK * np.eye(len(s) - 1)
         b = s[:-1, -1] / self._norms

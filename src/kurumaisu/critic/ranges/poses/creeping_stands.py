@@ -36,9 +36,9 @@ def gather_stands(recording: Recording, model: Model) -> Shots:
 def creeping_stands(shots: Shots) -> Mapping[str, Sequence[float]]:
     """Return the names of runs, and a time [s] within each stand in which the chair moves, by their clock.
 
-    Differences between the readings of a stand are compared: neither the map nor an error that lasts is in them. In front
-    of a single wall they do not tell a chair that moves from readings that are off: if it does in most stands, it does
-    in all.
+    Differences between the readings of a stand are compared: neither the map nor an error that lasts is in them. In
+    front of a single wall they do not tell a chair that moves from readings that are off: if it does in most stands, it
+    does in all.
     """
     stand = stands_of(shots)
     rows = np.flatnonzero(stand >= 0)
@@ -78,7 +78,7 @@ def _creeps(readings: FloatArray, valid: BoolArray, sd: FloatArray, poses: Float
 
 
 def _differences(readings: FloatArray, valid: BoolArray, sd: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return how far readings are from the mean of their beam, as scattered as single ones, and which are; as _creeps."""
+    """Return how far readings (k, b) are from the mean of their beam, scattered as single ones, and which count."""
     near = np.where(valid, readings, np.inf)
     middle = np.sort(near, axis=0)[np.maximum(valid.sum(axis=0) - 1, 0) // 2, range(near.shape[1])]
     with np.errstate(invalid="ignore"):

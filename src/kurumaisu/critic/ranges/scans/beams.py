@@ -19,6 +19,7 @@ from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world import load_world
 
 MOST_SCANS = 250  # that are criticised, evenly taken from all: 170 000 readings
+_FAN, _MORE = 682, 2.0  # beams of such a scan; of scans of fewer beams there may be more, at most so many times
 _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
 RATES = ("v", "w")  # [m/s, rad/s] of the chair, by the reference
@@ -100,7 +101,7 @@ def _referred(run: Run) -> bool:
 
 
 def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[float]] = MappingProxyType({})) -> Shots:
-    """Return the scans of the runs to fit, thinned evenly to at most MOST_SCANS. missing(recording) must be None.
+    """Return the scans of the runs to fit, thinned evenly. missing(recording) must be None.
 
     creeping: by run, times [s] in stands that are none.
     """
@@ -108,7 +109,8 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
     laser = laser_of(model.laser, recording.laser, recording.runs)
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
-    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, MOST_SCANS).astype(int))]
+    most = int(MOST_SCANS * np.clip(_FAN / laser.beams, 1.0, _MORE))
+    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int))]
     zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))

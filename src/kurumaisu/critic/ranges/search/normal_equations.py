@@ -299,7 +299,7 @@ class Assembly:
     def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> list[Gram]:
         """Return the normal equations of each scan; columns: which of all, None for all.
 
-        lasting: with the error of the poses that a stretch of the way shares.
+        lasting: with what lasts of the errors of the poses.
         """
         out = []
         for k in range(len(self.residual)):
