@@ -19,13 +19,13 @@ from scipy.sparse import coo_array
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FLOOR = 1e-6  # [m, rad] below which no sd counts
-# Of position [m], heading [rad], common mode [m], its time constant [s], how large errors of the poses that last are
-# and how long they do [s]: what is usual, the sd of its log, bounds.
-_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.25, 5.0])
+# Of position [m], heading [rad], common mode [m], its time constant [s], how large errors of positions that last are,
+# and of headings, and how long they do [s]: what is usual, the sd of its log, bounds.
+_USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.25, 0.25, 5.0])
 # A common mode may be of each scan alone, at 30 ms, or last for ten seconds.
-_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 1.0, 1.0])
-_LOW = np.array([1e-5, 1e-5, 1e-6, 0.01, 0.01, 1.0])
-_HIGH = np.array([0.3, 0.3, 0.1, 10.0, 7.0, 60.0])
+_SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 1.0, 1.0, 1.0])
+_LOW = np.array([1e-5, 1e-5, 1e-6, 0.01, 0.01, 0.01, 1.0])
+_HIGH = np.array([0.3, 0.3, 0.1, 10.0, 7.0, 7.0, 60.0])
 # Where somebody says how good a reference is, the log of what each pose errs by itself is within this, 1 sd, and it is
 # no more than so many times as large. That it wanders, a data sheet leaves out.
 _STATED, _LOUDER = 0.3, 1.5
@@ -45,7 +45,8 @@ class ScanNoise:
 
     position_sd [m], heading_sd [rad]: of each reference pose alone; common_sd [m]: of the offset of a scan, whose
     correlation with the next one falls off with a time constant common_tau [s]; lasting: how many times as large as
-    the poses' own errors are those whose correlation falls off with lasting_tau [s], as of a reference that wanders.
+    the positions' own errors are those whose correlation falls off with lasting_tau [s], as of a reference that
+    wanders; lasting_turn: the same of the headings.
     """
 
     position_sd: float
@@ -53,6 +54,7 @@ class ScanNoise:
     common_sd: float
     common_tau: float
     lasting: float = 0.0
+    lasting_turn: float = 0.0
     lasting_tau: float = 5.0
 
 
@@ -134,6 +136,7 @@ class _Stacked:
 
     def __init__(self, grams: Sequence[Gram], layout: Layout) -> None:
         self._layout = layout
+        self._common = len(grams[0].matrix) - grams[0].own - grams[0].shared
         groups: dict[tuple[int, int], list[int]] = {}
         for k, gram in enumerate(grams):
             groups.setdefault((gram.own, gram.shared), []).append(k)
@@ -150,24 +153,24 @@ class _Stacked:
     def marginal(self, noise: ScanNoise) -> tuple[FloatArray, float]:
         """Return what marginal does."""
         band, prior_log_det = precision(self._layout, noise)
-        cross, total, log_det = 0.0, 0.0, -prior_log_det
+        cross, total, log_det = np.zeros((band.shape[1], self._common)), np.zeros((self._common, self._common)), 0.0
         for part in self._parts:
             within, beside, rest, more = part.without_own(own_pose_sds(noise))
             log_det += more
-            total = total + rest
+            total += rest
             band += banded(part.index, within, band.shape)
-            cross = cross + gathered(part.index, beside, band.shape[1])
+            cross += gathered(part.index, beside, band.shape[1])
         factor = cholesky_banded(band, lower=True)
-        log_det += 2 * float(np.log(factor[0]).sum())
+        log_det += 2 * float(np.log(factor[0]).sum()) - prior_log_det
         return total - cross.T @ cho_solve_banded((factor, True), cross), log_det
 
 
-def banded(index: IntArray, parts: FloatArray, shape: tuple[int, int]) -> FloatArray:
-    """Return symmetric parts (n, s, s), whose rows and columns are index (n, s), added up, as a lower band of a shape."""
+def banded(index: IntArray, parts: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return symmetric parts (n, s, s), whose rows and columns are index (n, s), added up, as a lower band."""
     below = index[:, :, np.newaxis] - index[:, np.newaxis]
     use = below >= 0
     flat = (below * shape[1] + index[:, np.newaxis])[use]
-    return np.bincount(flat, parts[use], shape[0] * shape[1]).reshape(shape)
+    return np.asarray(np.bincount(flat, parts[use], shape[0] * shape[1]).reshape(shape), dtype=np.float64)
 
 
 def gathered(index: IntArray, parts: FloatArray, count: int) -> FloatArray:
@@ -221,7 +224,12 @@ def _inverse(lower: FloatArray) -> FloatArray:
 
 def pose_sds(noise: ScanNoise) -> FloatArray:
     """Return the sds (3,) of a reference pose."""
-    return np.asarray(np.hypot(1.0, noise.lasting) * own_pose_sds(noise))
+    return np.hypot(own_pose_sds(noise), lasting_sds(noise))
+
+
+def lasting_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of what of a reference pose's error lasts."""
+    return np.array([noise.lasting, noise.lasting, noise.lasting_turn]) * own_pose_sds(noise)
 
 
 def own_pose_sds(noise: ScanNoise) -> FloatArray:
@@ -238,7 +246,7 @@ def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
     band = np.zeros((layout.reach + 1, count))
     every = np.arange(len(common))
     log_det = _chain(band, layout, every, common, max(noise.common_sd, _FLOOR), noise.common_tau)
-    lasting = np.maximum(noise.lasting * own_pose_sds(noise), _FLOOR)
+    lasting = np.maximum(lasting_sds(noise), _FLOOR)
     stands = np.unique(pose[layout.stand >= 0])
     for axis, (slow, whole) in enumerate(zip(lasting.tolist(), pose_sds(noise).tolist(), strict=True)):
         log_det += _chain(band, layout, layout.moving, pose[layout.moving] + axis, slow, noise.lasting_tau)
@@ -285,7 +293,7 @@ class CommonMode:
 
 @dataclass(frozen=True)
 class _Usual:
-    """Logs of what of a ScanNoise is usual (6,), their sds (6,), and the most they may be (6,)."""
+    """Logs of what of a ScanNoise is usual (7,), their sds (7,), and the most they may be (7,)."""
 
     logs: FloatArray
     sds: FloatArray
@@ -329,13 +337,12 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     The last common column is the residual. truth: sds of the reference as somebody says, if anybody does.
     """
     likelihood, usual = _Likelihood(grams, layout, project), _Usual.of(truth)
-    none = np.where(np.arange(6) == 4, np.log(_NONE), usual.logs)
+    none = np.where(np.isin(np.arange(7), (4, 5)), np.log(_NONE), usual.logs)
     found = _likeliest(likelihood, replace(usual, logs=none), np.arange(4))
     here = likelihood(found)
-    lasting = min(_TRIED, key=lambda size: likelihood(replace(found, lasting=size)))
-    if likelihood(replace(found, lasting=lasting)) > here:
-        return found
-    return _likeliest(likelihood, usual, np.arange(6), np.log(astuple(replace(found, lasting=lasting))))
+    wandering = [replace(found, lasting=size, lasting_turn=size) for size in _TRIED]
+    begun = min(wandering, key=likelihood)
+    return found if likelihood(begun) > here else _likeliest(likelihood, usual, np.arange(7), np.log(astuple(begun)))
 
 
 def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
@@ -418,7 +425,7 @@ def _likeliest(
     at = usual.logs[free] if begin is None else begin
     for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
         simplex = np.vstack([at, at + step * np.eye(len(at))])
-        options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 100, "initial_simplex": simplex}
+        options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 25 * len(at), "initial_simplex": simplex}
         at = minimize(cost, at, method="Nelder-Mead", options=options).x
     return noise_at(at)
 

@@ -37,7 +37,8 @@ def stands_averaged(times: FloatArray, poses: FloatArray, creeping: Sequence[flo
     out = poses.copy()
     for rows in np.split(np.arange(len(times)), cuts):
         still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
-        if len(still) and any(times[still[0]] <= t <= times[still[-1]] for t in creeping):
+        inside = np.clip(creeping, times[0], times[-1])
+        if len(still) and ((inside >= times[still[0]]) & (inside <= times[still[-1]])).any():
             continue
         if len(still) >= max(_FEWEST, _MOSTLY * len(rows)) and _stands(poses[still], jitter):
             out[still] = poses[still].mean(axis=0)

@@ -23,6 +23,7 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
     ScanNoise,
     common_mode,
     estimate,
+    lasting_sds,
     marginal,
     own_pose_sds,
     pose_sds,
@@ -374,7 +375,7 @@ class Assembly:
     def random_sds(self, k: int, noise: ScanNoise) -> FloatArray:
         """Return the sds (q,) [m, rad] of what random_columns are of."""
         own = own_pose_sds(noise)
-        shared = pose_sds(noise) if self.layout.stand[k] >= 0 else noise.lasting * own
+        shared = pose_sds(noise) if self.layout.stand[k] >= 0 else lasting_sds(noise)
         count = 0 if self.layout.stand[k] >= 0 else self.hats[k].weights.shape[1]
         return np.concatenate([[noise.common_sd], shared, np.tile(own, count)])
 
