@@ -150,6 +150,36 @@ def test_normal_equations_are_those_of_the_dense_covariance():
     assert log_det == pytest.approx(expected, rel=1e-6)
 
 
+def test_errors_that_last_and_those_of_stands_are_those_of_the_dense_covariance():
+    """Three of seven scans are of one stand, amid the way; positions and headings wander as far as they do."""
+    rng = np.random.default_rng(18)
+    scans, beams, common = 7, 11, 2
+    noise = ScanNoise(0.01, 0.02, 0.005, 1.5, lasting=2.0, lasting_turn=0.7, lasting_tau=3.0)
+    times, run = np.array([0.0, 0.5, 1.5, 1.7, 2.0, 2.9, 0.4]), np.array([0, 0, 0, 0, 0, 0, 1])
+    stand = np.array([-1, -1, 0, 0, 0, -1, -1])
+    poses, columns = rng.standard_normal((scans, beams, 3)), rng.standard_normal((scans, beams, common))
+    grams = []
+    for k in range(scans):
+        own = poses[k] if stand[k] < 0 else np.empty((beams, 0))
+        rows = whitened(
+            np.hstack([own, np.ones((beams, 1)), poses[k], columns[k]]), np.full(beams, True), np.ones(beams), 0
+        )
+        grams.append(Gram(rows.T @ rows, own.shape[1], 4))
+    gram, log_det = marginal(grams, Layout(times, run, stand), noise)
+    apart, same = np.abs(times[:, None] - times), run[:, None] == run[None, :]
+    dense = np.kron(noise.common_sd**2 * np.exp(-apart / noise.common_tau) * same, np.ones((beams, beams)))
+    dense += np.eye(scans * beams)
+    moving, one = np.outer(stand < 0, stand < 0), np.outer(stand == 0, stand == 0)
+    for axis, (own, times_as_large) in enumerate([(0.01, 2.0), (0.01, 2.0), (0.02, 0.7)]):
+        slow = (own * times_as_large) ** 2 * np.exp(-apart / noise.lasting_tau) * same * moving
+        shared = slow + own**2 * np.diag(stand < 0) + own**2 * (1 + times_as_large**2) * one
+        each = poses[:, :, axis]
+        dense += np.einsum("kb,kl,lc->kblc", each, shared, each).reshape(dense.shape)
+    x = columns.reshape(-1, common)
+    np.testing.assert_allclose(gram, x.T @ np.linalg.solve(dense, x), rtol=1e-6)
+    assert log_det == pytest.approx(np.linalg.slogdet(dense)[1], rel=1e-6)
+
+
 def test_a_still_laser_gives_its_noise_away():
     rng = np.random.default_rng(9)
     ranges = np.linspace(0.5, 3.0, 682)

@@ -15,7 +15,7 @@ from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experimen
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
 from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
-from kurumaisu.critic.ranges.noise.scan_noise import pose_sds
+from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN, pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
@@ -29,7 +29,7 @@ from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEqua
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
 from kurumaisu.critic.scatter.common_offset import own_sd
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
-from kurumaisu.critic.values.policy import NAMED
+from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import Cause, NextExperiment
@@ -83,6 +83,12 @@ def criticise_scans(
     if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
         return _lead_first(question, assembly, normal, made, lead)
     made, fit = settled(assembly, normal, made, fit, recording.truth)
+    if recording.truth is not None:
+        beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms)
+        # What equations nearly right leave of what acts looks like a reference that wanders, too.
+        if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
+            progress("laser: the reference errs by more than is said")
+            return criticise_scans(replace(recording, truth=None), model, progress, ids)
     return _with_scatter(question, MeanFit(assembly, normal, made, fit))
 
 

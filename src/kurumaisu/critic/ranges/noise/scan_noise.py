@@ -26,14 +26,11 @@ _USUAL = np.array([0.005, 0.005, 2e-4, 1.0, 0.25, 0.25, 5.0])
 _SPREAD = np.array([2.0, 2.0, 1.0, 2.0, 1.0, 1.0, 1.0])
 _LOW = np.array([1e-5, 1e-5, 1e-6, 0.01, 0.01, 0.01, 1.0])
 _HIGH = np.array([0.3, 0.3, 0.1, 10.0, 7.0, 7.0, 60.0])
-# Where somebody says how good a reference is, the log of what each pose errs by itself is within this, 1 sd, and it is
-# no more than so many times as large. That it wanders, a data sheet leaves out.
-_STATED, _LOUDER = 0.3, 1.5
 _WHOLE = 0.99  # of the largest common mode
 _NONE = 0.05  # how much of a reference's errors lasts that does not wander, as far as can be seen
 _TRIED = (0.25, 0.5, 1.2)  # how much of them, one of which must be likelier
 _WEAK = 1e-9  # prior precision of a column's coefficient, in what the readings would tell if nothing else erred
-_CERTAIN = 5.0  # [nat] from which there is a common mode
+CERTAIN = 5.0  # [nat] from which there is a common mode, or a reference errs by more than is said
 _UNLIKELY = 0.01  # times as likely as the likeliest, below which no longer one counts
 _LENGTHS = 7  # of a common mode that are tried
 _APART = 0.2  # in logs, to see how surely each is known
@@ -291,24 +288,6 @@ class CommonMode:
         return sizes, taus
 
 
-@dataclass(frozen=True)
-class _Usual:
-    """Logs of what of a ScanNoise is usual (7,), their sds (7,), and the most they may be (7,)."""
-
-    logs: FloatArray
-    sds: FloatArray
-    most: FloatArray
-
-    @staticmethod
-    def of(truth: tuple[float, float] | None) -> _Usual:
-        """Return what is usual where somebody says how good the reference is, or nobody does."""
-        logs, sds, most = np.log(_USUAL), _SPREAD.copy(), np.log(_HIGH)
-        if truth is not None:
-            logs[:2], sds[:2] = np.log(np.maximum(truth, _LOW[:2])), _STATED
-            most[:2] = logs[:2] + np.log(_LOUDER)
-        return _Usual(logs, sds, most)
-
-
 class _Likelihood:
     """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
 
@@ -336,13 +315,34 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
 
     The last common column is the residual. truth: sds of the reference as somebody says, if anybody does.
     """
-    likelihood, usual = _Likelihood(grams, layout, project), _Usual.of(truth)
-    none = np.where(np.isin(np.arange(7), (4, 5)), np.log(_NONE), usual.logs)
-    found = _likeliest(likelihood, replace(usual, logs=none), np.arange(4))
+    likelihood, usual, known = _Likelihood(grams, layout, project), np.log(_USUAL), 0
+    if truth is not None:
+        usual[:2], known = np.log(np.maximum(truth, 1e-5)), 2
+    none = np.where(np.isin(np.arange(7), (4, 5)), np.log(_NONE), usual)
+    found = _likeliest(likelihood, none, np.arange(known, 4), stated=truth is not None)
     here = likelihood(found)
-    wandering = [replace(found, lasting=size, lasting_turn=size) for size in _TRIED]
+    wandering = [_wandering(found, size, size, stated=truth is not None) for size in _TRIED]
     begun = min(wandering, key=likelihood)
-    return found if likelihood(begun) > here else _likeliest(likelihood, usual, np.arange(7), np.log(astuple(begun)))
+    if likelihood(begun) > here:
+        return found
+    at = np.log(astuple(begun))[known:]
+    return _likeliest(likelihood, usual, np.arange(known, 7), at, stated=truth is not None)
+
+
+def beyond_stated(
+    grams: Sequence[Gram], layout: Layout, truth: tuple[float, float], project: IntArray, noise: ScanNoise
+) -> float:
+    """Return what says [nat] that a reference errs by more, or longer, than is said, by all its scans; as of estimate.
+
+    noise: the likeliest that it may have as stated.
+    """
+    likelihood, usual = _Likelihood(grams, layout, project), np.log(_USUAL)
+    usual[:2] = np.log(np.maximum(truth, 1e-5))
+    begun = [_wandering(noise, size, size, stated=False) for size in (max(noise.lasting, _NONE), *_TRIED)]
+    at = np.log(astuple(min(begun, key=likelihood)))
+    free = _likeliest(likelihood, usual, np.arange(7), at)
+    far = (np.log(astuple(free)) - usual) / _SPREAD
+    return likelihood(noise) - likelihood(free) - 0.5 * float(far @ far)
 
 
 def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
@@ -353,7 +353,7 @@ def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: Int
     """
     likelihood = _Likelihood(grams, layout, project)
     least = likelihood(noise)
-    if likelihood(replace(noise, common_sd=_FLOOR)) - least < _CERTAIN:
+    if likelihood(replace(noise, common_sd=_FLOOR)) - least < CERTAIN:
         return noise
     found = [(1.0, noise.common_sd**2, noise.common_tau)]
     for tau in np.geomspace(noise.common_tau, _HIGH[3], _LENGTHS)[1:].tolist():
@@ -402,27 +402,53 @@ def common_mode(
     values = np.maximum(values, 1 / np.max(_SPREAD[2:4]) ** 2)  # no less is known than before the data
     sds = np.sqrt(np.diag(vectors @ np.diag(1 / values) @ vectors.T))
     none = replace(noise, common_sd=max(own_sd, _FLOOR))
-    # Errors of the reference may stand in for it, and the model's own may last.
-    usual = replace(_Usual.of(truth), logs=np.log(np.clip(astuple(none), _LOW, _HIGH)))
-    none = _likeliest(likelihood, usual, np.array([0, 1, *([3] if own_sd else ())]))
+    # Errors of the reference may stand in for it, where nobody knows them, and the model's own may last.
+    free = [*(range(2) if truth is None else ()), *([3] if own_sd else ())]
+    if free:
+        none = _likeliest(likelihood, np.log(np.clip(astuple(none), _LOW, _HIGH)), np.array(free))
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
 
+def _wandering(noise: ScanNoise, lasting: float, turn: float, *, stated: bool) -> ScanNoise:
+    """Return a noise of which so much lasts; stated: of what is said of the reference, which is all of its errors."""
+    position, heading = 1.0, 1.0
+    if stated:
+        position = float(np.hypot(1.0, noise.lasting) / np.hypot(1.0, lasting))
+        heading = float(np.hypot(1.0, noise.lasting_turn) / np.hypot(1.0, turn))
+    return replace(
+        noise,
+        position_sd=position * noise.position_sd,
+        heading_sd=heading * noise.heading_sd,
+        lasting=lasting,
+        lasting_turn=turn,
+    )
+
+
 def _likeliest(
-    likelihood: _Likelihood, usual: _Usual, free: IntArray, begin: FloatArray | None = None
+    likelihood: _Likelihood,
+    usual: FloatArray,
+    free: IntArray,
+    begin: FloatArray | None = None,
+    *,
+    stated: bool = False,
 ) -> ScanNoise:
-    """Return the noise with some of its logs fitted, from `begin` or what is usual on, the others as is usual."""
+    """Return the noise with some of its logs fitted, from `begin` or what is usual on, the others as is usual.
+
+    stated: as of _wandering, the usual sds of a pose being all of its errors.
+    """
 
     def noise_at(values: FloatArray) -> ScanNoise:
-        every = usual.logs.copy()
-        every[free] = np.clip(values, np.log(_LOW)[free], usual.most[free])
-        return ScanNoise(*(float(value) for value in np.exp(every)))
+        every = usual.copy()
+        every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
+        found = ScanNoise(*(float(value) for value in np.exp(every)))
+        none = replace(found, lasting=0.0, lasting_turn=0.0)
+        return _wandering(none, found.lasting, found.lasting_turn, stated=True) if stated else found
 
     def cost(values: FloatArray) -> float:
-        distance = (values - usual.logs[free]) / usual.sds[free]
+        distance = (values - usual[free]) / _SPREAD[free]
         return likelihood(noise_at(values)) + 0.5 * float(distance @ distance)
 
-    at = usual.logs[free] if begin is None else begin
+    at = usual[free] if begin is None else begin
     for step in (1.0, 0.3):  # a second start from the end of the first: it may stop early on a ridge
         simplex = np.vstack([at, at + step * np.eye(len(at))])
         options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 25 * len(at), "initial_simplex": simplex}

@@ -89,9 +89,7 @@ def _differences(readings: FloatArray, valid: BoolArray, sd: FloatArray) -> tupl
     return np.where(use, readings - mean, 0.0) / np.sqrt(1 - 1 / np.maximum(count, 2)), use
 
 
-def _moved(
-    off: FloatArray, use: BoolArray, sd: FloatArray, poses: FloatArray, rho: float
-) -> tuple[float, FloatArray]:
+def _moved(off: FloatArray, use: BoolArray, sd: FloatArray, poses: FloatArray, rho: float) -> tuple[float, FloatArray]:
     """Return how far poses of their own move the scans (k, b), squared, in sds, and what they leave [sd].
 
     Beside what moves a whole scan; rho: how neighbours correlate.

@@ -21,6 +21,7 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
     Gram,
     Layout,
     ScanNoise,
+    beyond_stated,
     common_mode,
     estimate,
     lasting_sds,
@@ -247,6 +248,12 @@ class Assembly:
         grams = self.grams(normal.beam_noise, project, lasting=True)
         seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
         return replace(seen, wary=normal.wary)
+
+    def beyond_stated(self, normal: NormalEquations, truth: tuple[float, float], fitted: Sequence[Form]) -> float:
+        """Return what says [nat] that the reference errs by more than is said, whatever acts on the mean; fitted: forms of it."""
+        project = self._projected(fitted)
+        grams = self.grams(normal.beam_noise, project, lasting=True)
+        return beyond_stated(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
 
     def full(self, normal: NormalEquations) -> NormalEquations:
         """Return the normal equations of all columns, in the noise that is known."""

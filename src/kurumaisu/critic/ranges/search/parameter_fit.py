@@ -26,7 +26,7 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _STEPS = 2
-_ROUNDS = 4  # times that the scans are seen anew with what moves their beams
+_ROUNDS = 8  # times, at most, that the scans are seen anew with what moves their beams
 _SETTLED = 0.5  # sds by which a parameter may still move between two of them
 STRONG = 1.0  # rms of what acts, in sds of single readings, from which scans are seen anew with it
 _STEP = 0.05  # of a finite difference, in units of the larger of a parameter and its scale
