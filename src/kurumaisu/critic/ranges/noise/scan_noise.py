@@ -325,8 +325,8 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     begun = min(wandering, key=likelihood)
     if likelihood(begun) > here:
         return found
-    at = np.log(astuple(begun))[known:]
-    return _likeliest(likelihood, usual, np.arange(known, 7), at, stated=truth is not None)
+    free = np.arange(7) if truth is None else np.array([2, 3, 4, 6])
+    return _likeliest(likelihood, usual, free, np.log(astuple(begun))[free], stated=truth is not None)
 
 
 def beyond_stated(
@@ -434,7 +434,7 @@ def _likeliest(
 ) -> ScanNoise:
     """Return the noise with some of its logs fitted, from `begin` or what is usual on, the others as is usual.
 
-    stated: as of _wandering, the usual sds of a pose being all of its errors.
+    stated: as of _wandering, the usual sds of a pose being all of its errors, positions and headings alike.
     """
 
     def noise_at(values: FloatArray) -> ScanNoise:
@@ -442,7 +442,7 @@ def _likeliest(
         every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
         found = ScanNoise(*(float(value) for value in np.exp(every)))
         none = replace(found, lasting=0.0, lasting_turn=0.0)
-        return _wandering(none, found.lasting, found.lasting_turn, stated=True) if stated else found
+        return _wandering(none, found.lasting, found.lasting, stated=True) if stated else found
 
     def cost(values: FloatArray) -> float:
         distance = (values - usual[free]) / _SPREAD[free]

@@ -250,7 +250,7 @@ class Assembly:
         return replace(seen, wary=normal.wary)
 
     def beyond_stated(self, normal: NormalEquations, truth: tuple[float, float], fitted: Sequence[Form]) -> float:
-        """Return what says [nat] that the reference errs by more than is said, whatever acts on the mean; fitted: forms of it."""
+        """Return what says [nat] that the reference errs by more than is said; fitted: forms that act."""
         project = self._projected(fitted)
         grams = self.grams(normal.beam_noise, project, lasting=True)
         return beyond_stated(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
