@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import BEAM_TIME, BEAMS, FIRST, INCREMENT, cast, recording
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.ranges.poses.creeping_stands import creeping_stands, gather_stands
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.valid_readings import pose_weights
@@ -57,6 +58,51 @@ def test_a_stand_begins_when_the_chair_has_rolled_out():
         rows = np.flatnonzero(np.r_[False, same] | np.r_[same, False])
         assert 13 <= rows[0] <= 15, seed
         assert 55 <= rows[-1] <= 58, seed
+
+
+def standing(data, creep):
+    """The recording of a chair that stands in the middle of the room, where it wavers by creep [m, rad], slowly."""
+    rng = np.random.default_rng(3)
+    run, bearings = data.runs[0], FIRST + INCREMENT * np.arange(BEAMS)
+
+    def pose(t):
+        wave = np.stack([np.sin(0.9 * t), np.cos(1.3 * t), np.sin(0.7 * t + 1)], axis=-1)
+        return np.array([2.9, 2.3, 0.4]) + creep * wave
+
+    rows = []
+    for stamp in run.scan.t.tolist():
+        poses = pose(stamp + BEAM_TIME * np.arange(BEAMS))
+        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        r, _, _ = cast(poses[:, :2] + 0.30 * np.stack([c, s], axis=-1), poses[:, 2] + bearings)
+        noise = (0.002334 - 0.000488 * r + 0.000199 * r * r) * rng.standard_normal(BEAMS)
+        rows.append(np.round(1.004587 * r + 0.058826 + noise, 3))
+    poses = pose(run.pose.t) + 0.003 * rng.standard_normal((len(run.pose.t), 3))
+    pose_table, scans = replace(run.pose, values=poses), replace(run.scan, values=np.array(rows))
+    return replace(data, runs=(replace(run, pose=pose_table, scan=scans),))
+
+
+@pytest.mark.parametrize(("creep", "stands"), [(0.0, True), (0.002, False)])
+def test_a_stand_in_which_scans_see_the_chair_move_is_none(tmp_path, creep, stands):
+    """The poses, which err by 3 mm and 3 mrad, see nothing of it; whole scans seemed to be off together."""
+    data = standing(recording(tmp_path, None, 0.0, 1, scans=30), creep)
+    assert bool(creeping_stands(gather(data, MODEL))) != stands
+    shots = gather_stands(data, MODEL)
+    assert (np.ptp(shots.tracks[0].poses, axis=0).max() == 0) == stands
+    finding = criticise_scans(data, MODEL, lambda _: None)
+    assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())
+
+
+def test_scans_in_a_gap_of_the_poses_are_left_out(tmp_path):
+    """Nobody knows where the chair was; where it stood, there is no gap."""
+    data = recording(tmp_path, None, 0.0, 1, scans=30)
+    run = data.runs[0]
+    keep = (run.pose.t < 4.0) | (run.pose.t > 5.2)
+    gone = replace(run.pose, t=run.pose.t[keep], values=run.pose.values[keep])
+    shots = gather(replace(data, runs=(replace(run, pose=gone),)), MODEL)
+    missing = sorted(set(run.scan.t.tolist()) - set(shots.stamps.tolist()))
+    assert missing == [t for t in run.scan.t.tolist() if 3.9 < t < 5.2]
+    still = replace(gone, values=np.repeat(gone.values[:1], len(gone.t), axis=0))
+    assert len(gather(replace(data, runs=(replace(run, pose=still),)), MODEL).stamps) == len(run.scan.t)
 
 
 def test_a_scan_rests_on_the_poses_of_when_its_beams_leave(tmp_path):
