@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Shots, with_own
+from kurumaisu.critic.ranges.scans.beams import Shots, scans_of, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
@@ -81,7 +81,7 @@ def _of_readings(
     strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
     how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
     """
-    rows = fit.assembly.smooth_rows(_SCATTERED)
+    rows = fit.assembly.smooth_rows(scans_of(assembly.shots.laser, _SCATTERED))
     few = fit.assembly.thinned(rows)
     few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
     statistics = Statistics(few, fit.normal.scan_noise)
