@@ -6,7 +6,8 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.critic.judge.scan_verdict import size_of
-from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, Gram, Layout, ScanNoise, common_mode, estimate
+from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, common_mode, estimate
+from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.scatter.common_offset import beyond_own_offset, own_sd, with_common_offset

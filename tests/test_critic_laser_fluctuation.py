@@ -9,14 +9,8 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.noise.scan_noise import (
-    Gram,
-    Layout,
-    ScanNoise,
-    _Likelihood,
-    whitened,
-    with_lasting_common_mode,
-)
+from kurumaisu.critic.ranges.noise.scan_noise import _Likelihood, with_lasting_common_mode
+from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, whitened
 from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly

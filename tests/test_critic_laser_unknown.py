@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
-from kurumaisu.critic.ranges.noise.scan_noise import Gram, Layout, ScanNoise, whitened
+from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, whitened
 from kurumaisu.critic.ranges.poses.likeliest_path import PoseEvidence, likeliest_path, motion_evidence
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged
 from kurumaisu.critic.ranges.search import block_evidence

@@ -15,7 +15,8 @@ from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experimen
 from kurumaisu.critic.judge.scan_shortcomings import shortcomings
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
 from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
-from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN, pose_sds
+from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN
+from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.beams import why_not_usable

@@ -11,7 +11,8 @@ import numpy as np
 from scipy.special import expit
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, ScanNoise
+from kurumaisu.critic.ranges.noise.scan_noise import CommonMode
+from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.values.policy import NAMED, RIVAL
 from kurumaisu.critic.values.prior import log_prior

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
-from kurumaisu.critic.ranges.noise.scan_noise import Layout, ScanNoise
+from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray

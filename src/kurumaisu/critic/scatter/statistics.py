@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
-from kurumaisu.critic.ranges.noise.scan_noise import ScanNoise
+from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded, solve_triangular
 
-from kurumaisu.critic.ranges.noise.scan_noise import (
+from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
     Layout,
     ScanNoise,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.scan_noise import Layout
+from kurumaisu.critic.ranges.noise.shared_errors import Layout
 from kurumaisu.critic.ranges.scans.beams import BeamHits
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray

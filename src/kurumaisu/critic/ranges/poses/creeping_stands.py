@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE, OUTLIER, neighbours_correlation
-from kurumaisu.critic.ranges.noise.scan_noise import whitened
+from kurumaisu.critic.ranges.noise.shared_errors import whitened
 from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
 from kurumaisu.critic.ranges.scans.beams import Shots, gather, hits_of, moved_by_pose, predict, some_scans
 from kurumaisu.critic.ranges.scans.valid_readings import usable_readings

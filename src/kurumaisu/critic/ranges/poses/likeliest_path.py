@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solveh_banded
 
+from kurumaisu.critic.ranges.noise.shared_errors import Gram
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -38,6 +39,18 @@ class PoseEvidence:
     rows: slice
     inner: FloatArray
     outer: FloatArray
+
+
+def pose_evidence(gram: Gram, rows: slice, width: float, common_sd: float) -> PoseEvidence:
+    """Return what a scan says of its poses, its common mode of sd common_sd [m] integrated out.
+
+    rows: of the track, that it rests on; width: of what it leaves, in deviations.
+    """
+    common, poses = gram.own, np.arange(gram.own) if gram.own else np.arange(1, 4)
+    matrix = gram.matrix / width**2
+    beside = matrix[poses, common] / (matrix[common, common] + common_sd**-2)
+    inner = matrix[np.ix_(poses, poses)] - np.outer(beside, matrix[common, poses])
+    return PoseEvidence(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
 
 
 def likeliest_path(

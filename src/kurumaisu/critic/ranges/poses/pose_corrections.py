@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.scan_noise import Layout
+from kurumaisu.critic.ranges.noise.shared_errors import Layout
 from kurumaisu.critic.ranges.poses.likeliest_path import DOUBT, PoseEvidence, likeliest_path
 from kurumaisu.critic.ranges.scans.beams import Shots, Track
 from kurumaisu.critic.ranges.scans.valid_readings import PoseWeights

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.scan_noise import pose_sds
+from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.search.effect_sets import FormPosterior
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained

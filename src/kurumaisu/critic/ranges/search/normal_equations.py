@@ -18,20 +18,22 @@ from kurumaisu.critic.ranges.noise.reading_noise import (
 )
 from kurumaisu.critic.ranges.noise.scan_noise import (
     CommonMode,
-    Gram,
-    Layout,
-    ScanNoise,
     beyond_stated,
     common_mode,
     estimate,
+    with_lasting_common_mode,
+)
+from kurumaisu.critic.ranges.noise.shared_errors import (
+    Gram,
+    Layout,
+    ScanNoise,
     lasting_sds,
     marginal,
     own_pose_sds,
     pose_sds,
     whitened,
-    with_lasting_common_mode,
 )
-from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence
+from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence, pose_evidence
 from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
 from kurumaisu.critic.ranges.scans.beams import Shots, model_effects_with, moved_by_pose, predict, some_scans
 from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
@@ -161,7 +163,7 @@ class Assembly:
                 # What nothing fits as well as its noise allows, says less by as much.
                 z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
                 width = max(SIGMA_PER_MAD * float(np.median(z)), 1.0) if len(z) else 1.0
-                out.append(_pose_evidence(gram, self.hats[k].rows, width))
+                out.append(pose_evidence(gram, self.hats[k].rows, width, _BROAD.common_sd))
             z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
             beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * SIGMA_PER_MAD * np.nanmedian(z)))
         return out
@@ -390,18 +392,6 @@ class Assembly:
         """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
         seen = self.marks.seen
         return seen.origins, np.array([each.bearings for each in seen.beams])
-
-
-def _pose_evidence(gram: Gram, rows: slice, width: float) -> PoseEvidence:
-    """Return what a scan says of its poses, its common mode integrated out.
-
-    rows: of the track, that it rests on; width: of what it leaves, in deviations.
-    """
-    common, poses = gram.own, np.arange(gram.own) if gram.own else np.arange(1, 4)
-    matrix = gram.matrix / width**2
-    beside = matrix[poses, common] / (matrix[common, common] + _BROAD.common_sd**-2)
-    inner = matrix[np.ix_(poses, poses)] - np.outer(beside, matrix[common, poses])
-    return PoseEvidence(rows, inner, matrix[poses, -1] - beside * matrix[common, -1])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""Errors that the readings of a scan share, and scans with each other, integrated out of their normal equations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.sparse import coo_array
+
+from kurumaisu.types import BoolArray, FloatArray, IntArray
+
+FLOOR = 1e-6  # [m, rad] below which no sd counts
+
+
+@dataclass(frozen=True)
+class ScanNoise:
+    """Errors that the readings of a scan share.
+
+    position_sd [m], heading_sd [rad]: of each reference pose alone; common_sd [m]: of the offset of a scan, whose
+    correlation with the next one falls off with a time constant common_tau [s]; lasting: how many times as large as
+    the positions' own errors are those whose correlation falls off with lasting_tau [s], as of a reference that
+    wanders; lasting_turn: the same of the headings.
+    """
+
+    position_sd: float
+    heading_sd: float
+    common_sd: float
+    common_tau: float
+    lasting: float = 0.0
+    lasting_turn: float = 0.0
+    lasting_tau: float = 5.0
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How scans hang together: times (k,) [s]; run (k,); stand (k,): scans of one and the same pose row, or -1."""
+
+    times: FloatArray
+    run: IntArray
+    stand: IntArray
+
+    @cached_property
+    def nodes(self) -> tuple[IntArray, IntArray, int]:
+        """Return which of the errors that scans share are each scan's (k,): its common mode, its pose; and their count.
+
+        Of a pose the first of three, x, y, yaw: of a stand all its scans' own, else what lasts of the errors until this
+        scan. In the order of the scans, so that only near ones have to do with each other.
+        """
+        common, pose, count = np.empty(len(self.times), dtype=np.int64), np.empty(len(self.times), dtype=np.int64), 0
+        known: dict[int, int] = {}
+        for k, stand in enumerate(self.stand.tolist()):
+            pose[k] = known.get(stand, count) if stand >= 0 else count
+            if pose[k] == count:
+                known[stand] = count
+                count += 3
+            common[k], count = count, count + 1
+        return common, pose, count
+
+    @cached_property
+    def moving(self) -> IntArray:
+        """Return the scans that were not taken in a stand."""
+        return np.flatnonzero(self.stand < 0)
+
+    @cached_property
+    def reach(self) -> int:
+        """How far apart two errors are at most, in their order, that have to do with each other."""
+        common, pose, _ = self.nodes
+        steps = [np.diff(common), np.abs(common - pose) + 2, np.diff(pose[self.moving]), np.array([3])]
+        return int(max(step.max(initial=0) for step in steps))
+
+
+@dataclass(frozen=True)
+class Gram:
+    """Normal equations of one scan, whitened within the scan.
+
+    own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
+    follow, one for its common mode and three for the error of its stand's pose or, where asked for, for what lasts of
+    its poses' errors; the rest are common to all scans.
+    """
+
+    matrix: FloatArray
+    own: int
+    shared: int
+
+
+def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) -> FloatArray:
+    """Return L^-1 X, (valid readings of the scan, m), for columns X (b, m), deviations sd (b,) [m] and neighbours' rho.
+
+    Neighbours with gaps between them correlate by rho to the power of their distance.
+    """
+    at = np.flatnonzero(valid)
+    z = columns[at] / sd[at, np.newaxis]
+    shared = rho ** np.diff(at)[:, np.newaxis]
+    out = z.copy()
+    out[1:] = (z[1:] - shared * z[:-1]) / np.sqrt(1 - shared**2)
+    return np.asarray(out)
+
+
+def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the normal equations of the columns common to all, scans' errors integrated out, and a log determinant.
+
+    The latter is that of the covariance, relative to independent readings.
+    """
+    return Stacked(grams, layout).marginal(noise)
+
+
+class Stacked:
+    """Grams in a few large arrays, for noises to be tried on."""
+
+    def __init__(self, grams: Sequence[Gram], layout: Layout) -> None:
+        self._layout = layout
+        self._common = len(grams[0].matrix) - grams[0].own - grams[0].shared
+        groups: dict[tuple[int, int], list[int]] = {}
+        for k, gram in enumerate(grams):
+            groups.setdefault((gram.own, gram.shared), []).append(k)
+        self._parts = [
+            _Part(np.array([grams[k].matrix for k in rows]), own, shared, self._index(np.array(rows), shared))
+            for (own, shared), rows in groups.items()
+        ]
+
+    def _index(self, rows: IntArray, shared: int) -> IntArray:
+        """Return of which of the errors that scans share (n, shared) these scans have theirs."""
+        common, pose, _ = self._layout.nodes
+        return np.column_stack([common[rows], pose[rows, np.newaxis] + np.arange(shared - 1)])
+
+    def marginal(self, noise: ScanNoise) -> tuple[FloatArray, float]:
+        """Return what marginal does."""
+        band, prior_log_det = precision(self._layout, noise)
+        cross, total, log_det = np.zeros((band.shape[1], self._common)), np.zeros((self._common, self._common)), 0.0
+        for part in self._parts:
+            within, beside, rest, more = part.without_own(own_pose_sds(noise))
+            log_det += more
+            total += rest
+            band += banded(part.index, within, band.shape)
+            cross += gathered(part.index, beside, band.shape[1])
+        factor = cholesky_banded(band, lower=True)
+        log_det += 2 * float(np.log(factor[0]).sum()) - prior_log_det
+        return total - cross.T @ cho_solve_banded((factor, True), cross), log_det
+
+
+def banded(index: IntArray, parts: FloatArray, shape: tuple[int, ...]) -> FloatArray:
+    """Return symmetric parts (n, s, s), whose rows and columns are index (n, s), added up, as a lower band."""
+    below = index[:, :, np.newaxis] - index[:, np.newaxis]
+    use = below >= 0
+    flat = (below * shape[1] + index[:, np.newaxis])[use]
+    return np.asarray(np.bincount(flat, parts[use], shape[0] * shape[1]).reshape(shape), dtype=np.float64)
+
+
+def gathered(index: IntArray, parts: FloatArray, count: int) -> FloatArray:
+    """Return parts (n, s, c), whose rows are index (n, s), added up (count, c)."""
+    places = coo_array((np.ones(index.size), (index.ravel(), np.arange(index.size))), (count, index.size))
+    return np.asarray(places @ parts.reshape(index.size, -1))
+
+
+class _Part:
+    """Grams (n, m, m) of the same parts; index (n, shared): of which errors that scans share each has its own."""
+
+    def __init__(self, matrices: FloatArray, own: int, shared: int, index: IntArray) -> None:
+        lead = own + shared
+        self.index = index
+        self._own, self._outer = matrices[:, :own, :own], np.ascontiguousarray(matrices[:, :own, own:])
+        self._within, self._beside = matrices[:, own:lead, own:lead], matrices[:, own:lead, lead:]
+        self._rest = matrices[:, lead:, lead:].sum(axis=0)
+
+    def without_own(self, size: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Return parts of the grams when errors of sds size (3,) of their own poses are integrated out.
+
+        (n, shared, shared) within what is shared, (n, shared, c) beside the common columns, (c, c) of these, and a log
+        determinant.
+        """
+        own, shared = self._own.shape[1], self.index.shape[1]
+        if own == 0:
+            return self._within, self._beside, self._rest, 0.0
+        scale = np.tile(size, own // 3)
+        inner = self._own * np.outer(scale, scale) + np.eye(own)
+        lower = np.linalg.cholesky(inner)
+        root = (_inverse(lower) * scale) @ self._outer
+        log_det = 2 * float(np.log(np.diagonal(lower, axis1=1, axis2=2)).sum())
+        lead, common = root[:, :, :shared].transpose(0, 2, 1), root[:, :, shared:]
+        flat = common.reshape(-1, common.shape[2])
+        return (
+            self._within - lead @ root[:, :, :shared],
+            self._beside - lead @ common,
+            self._rest - flat.T @ flat,
+            log_det,
+        )
+
+
+def _inverse(lower: FloatArray) -> FloatArray:
+    """Return the inverses of many small lower triangles (n, q, q), a row of all at a time."""
+    out = np.zeros_like(lower)
+    for i in range(lower.shape[1]):
+        out[:, i, i] = 1 / lower[:, i, i]
+        out[:, i, :i] = -np.einsum("nj,njk->nk", lower[:, i, :i], out[:, :i, :i]) * out[:, i, i, np.newaxis]
+    return out
+
+
+def pose_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of a reference pose."""
+    return np.hypot(own_pose_sds(noise), lasting_sds(noise))
+
+
+def lasting_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of what of a reference pose's error lasts."""
+    return np.array([noise.lasting, noise.lasting, noise.lasting_turn]) * own_pose_sds(noise)
+
+
+def own_pose_sds(noise: ScanNoise) -> FloatArray:
+    """Return the sds (3,) of what of a reference pose's error is its own."""
+    return np.maximum([noise.position_sd, noise.position_sd, noise.heading_sd], FLOOR)
+
+
+def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
+    """Return the precision of the errors that scans share, as a lower band (reach + 1, n), and its log determinant.
+
+    Common modes and what lasts of the poses' errors follow the last ones of a run; stands have errors of their own.
+    """
+    common, pose, count = layout.nodes
+    band = np.zeros((layout.reach + 1, count))
+    every = np.arange(len(common))
+    log_det = _chain(band, layout, every, common, max(noise.common_sd, FLOOR), noise.common_tau)
+    lasting = np.maximum(lasting_sds(noise), FLOOR)
+    stands = np.unique(pose[layout.stand >= 0])
+    for axis, (slow, whole) in enumerate(zip(lasting.tolist(), pose_sds(noise).tolist(), strict=True)):
+        log_det += _chain(band, layout, layout.moving, pose[layout.moving] + axis, slow, noise.lasting_tau)
+        band[0, stands + axis] += whole**-2
+        log_det -= 2 * len(stands) * float(np.log(whole))
+    return band, log_det
+
+
+def _chain(band: FloatArray, layout: Layout, rows: IntArray, at: IntArray, sd: float, tau: float) -> float:
+    """Add the precision of errors of an sd that fall off with tau [s] within a run, and return its log determinant.
+
+    rows: of scans; at: where each has its error.
+    """
+    times, run = layout.times[rows], layout.run[rows]
+    rho = np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
+    innovation = sd**2 * np.maximum(np.concatenate([np.ones(min(len(rows), 1)), 1 - rho**2]), 1e-9)  # variances
+    band[0, at] += 1 / innovation
+    band[0, at[:-1]] += rho**2 / innovation[1:]
+    band[np.diff(at), at[:-1]] -= rho / innovation[1:]
+    return -float(np.log(innovation).sum())
