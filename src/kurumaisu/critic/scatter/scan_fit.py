@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.ranges.noise.reading_noise import expected_readings
-from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise
+from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise, correlations
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -39,8 +39,7 @@ def basis_of(assembly: Assembly, noise: ScanNoise) -> tuple[FloatArray, FloatArr
 def drawn_errors(size: FloatArray, layout: Layout, tau: float, rng: np.random.Generator) -> FloatArray:
     """Return errors (k, q) of sds (k, q) as of basis_of, of the poses alone; tau [s]: for which what lasts does so."""
     draws = rng.standard_normal(size.shape)
-    kept = np.where(np.diff(layout.run) == 0, np.exp(-np.abs(np.diff(layout.times)) / tau), 0.0)
-    for k, rho in enumerate(kept.tolist(), 1):
+    for k, rho in enumerate(correlations(layout.times, layout.run, tau).tolist(), 1):
         draws[k, 1:4] = rho * draws[k - 1, 1:4] + np.sqrt(1 - rho**2) * draws[k, 1:4]
     for stand in np.unique(layout.stand[layout.stand >= 0]):  # scans of one pose have its one error
         draws[layout.stand == stand] = draws[np.flatnonzero(layout.stand == stand)[0]]

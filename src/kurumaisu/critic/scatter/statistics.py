@@ -76,7 +76,6 @@ class Statistics:
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._layout, self._tau = assembly.layout, noise.lasting_tau
-        self._stand = assembly.layout.stand
         self._basis, self._size = basis_of(assembly, noise)
         self._moved = assembly.moved
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
@@ -108,7 +107,7 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_once(self._edges.mixed(readings), self._stand)))
+        out.append(_share(_once(self._edges.mixed(readings), self._layout.stand)))
         return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -124,7 +123,7 @@ class Statistics:
         """Return which readings count, what is left of them, cut, and what of it fluctuates, and where; (k, b) each."""
         inside = self._trust & np.isfinite(left)
         z = np.where(inside, np.clip(left, -_CLIP, _CLIP), 0.0)
-        return inside, z, *fluctuating(z, inside, self._stand)
+        return inside, z, *fluctuating(z, inside, self._layout.stand)
 
     def names(self) -> list[str]:
         """Return what a reader calls the numbers, in their order."""
@@ -187,7 +186,7 @@ class Statistics:
             if len(self._fits) >= _KEPT:
                 del self._fits[next(iter(self._fits))]
             trust = self._trust & inside_ends(self._base, ends, _WITHIN * self._reach)
-            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._stand, self._moved)
+            self._fits[ends] = ScanFit(self._basis, self._size, self._sd, trust, self._layout.stand, self._moved)
         return self._fits[ends].leftover(error)
 
 

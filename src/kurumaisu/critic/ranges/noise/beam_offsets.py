@@ -58,12 +58,11 @@ def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: flo
 def without_beam_offsets(
     grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
-    """Return normal equations as scan_noise.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
+    """Return normal equations as shared_errors.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
 
     All grams share as many errors with others.
     """
     size, beams = own_pose_sds(noise), len(cross.inner)
-    common, pose, shared = layout.nodes
     outer = cross.common.copy()
     inner, total = cross.inner + max(beam_sd, _FLOOR) ** -2 * np.eye(beams), np.zeros((outer.shape[1], outer.shape[1]))
     taken: list[tuple[FloatArray, FloatArray]] = []
@@ -83,10 +82,10 @@ def without_beam_offsets(
         inner -= parts.T @ parts
         outer -= parts.T @ columns
         total -= columns.T @ columns
-    index = np.column_stack([common, pose[:, np.newaxis] + np.arange(len(within[0]) - 1)])
+    index = layout.index(np.arange(len(grams)), len(within[0]))
     band = precision(layout, noise)[0]
     factor = cholesky_banded(band + banded(index, np.array(within), band.shape), lower=True)
-    every = gathered(index, np.array(beside), shared)
+    every = gathered(index, np.array(beside), band.shape[1])
     left = every.T @ cho_solve_banded((factor, True), every)
     inner, outer, total = inner - left[:beams, :beams], outer - left[:beams, beams:], total - left[beams:, beams:]
     return np.asarray(total - outer.T @ cho_solve(cho_factor(inner), outer))

@@ -60,6 +60,11 @@ class Layout:
             common[k], count = count, count + 1
         return common, pose, count
 
+    def index(self, rows: IntArray, shared: int) -> IntArray:
+        """Return of which of these errors each of some scans (n,) has its first ones (n, shared)."""
+        common, pose, _ = self.nodes
+        return np.column_stack([common[rows], pose[rows, np.newaxis] + np.arange(shared - 1)])
+
     @cached_property
     def moving(self) -> IntArray:
         """Return the scans that were not taken in a stand."""
@@ -118,14 +123,9 @@ class Stacked:
         for k, gram in enumerate(grams):
             groups.setdefault((gram.own, gram.shared), []).append(k)
         self._parts = [
-            _Part(np.array([grams[k].matrix for k in rows]), own, shared, self._index(np.array(rows), shared))
+            _Part(np.array([grams[k].matrix for k in rows]), own, shared, layout.index(np.array(rows), shared))
             for (own, shared), rows in groups.items()
         ]
-
-    def _index(self, rows: IntArray, shared: int) -> IntArray:
-        """Return of which of the errors that scans share (n, shared) these scans have theirs."""
-        common, pose, _ = self._layout.nodes
-        return np.column_stack([common[rows], pose[rows, np.newaxis] + np.arange(shared - 1)])
 
     def marginal(self, noise: ScanNoise) -> tuple[FloatArray, float]:
         """Return what marginal does."""
@@ -232,13 +232,18 @@ def precision(layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
     return band, log_det
 
 
+def correlations(times: FloatArray, run: IntArray, tau: float) -> FloatArray:
+    """Return how errors at times (k,) [s] that fall off with tau [s] correlate with the next ones, 0 over runs (k,)."""
+    return np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
+
+
 def _chain(band: FloatArray, layout: Layout, rows: IntArray, at: IntArray, sd: float, tau: float) -> float:
     """Add the precision of errors of an sd that fall off with tau [s] within a run, and return its log determinant.
 
     rows: of scans; at: where each has its error.
     """
     times, run = layout.times[rows], layout.run[rows]
-    rho = np.where(np.diff(run) == 0, np.exp(-np.abs(np.diff(times)) / tau), 0.0)
+    rho = correlations(times, run, tau)
     innovation = sd**2 * np.maximum(np.concatenate([np.ones(min(len(rows), 1)), 1 - rho**2]), 1e-9)  # variances
     band[0, at] += 1 / innovation
     band[0, at[:-1]] += rho**2 / innovation[1:]

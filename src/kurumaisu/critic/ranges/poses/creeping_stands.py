@@ -14,7 +14,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE, OUTLIER, neighbours_correlation
 from kurumaisu.critic.ranges.noise.shared_errors import whitened
 from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
-from kurumaisu.critic.ranges.scans.beams import Shots, gather, hits_of, moved_by_pose, predict, some_scans
+from kurumaisu.critic.ranges.scans.beams import Shots, deviations, gather, hits_of, moved_by_pose, predict, some_scans
 from kurumaisu.critic.ranges.scans.valid_readings import usable_readings
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model
@@ -22,7 +22,7 @@ from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 _CREEPS = 4.0  # times as much as noise alone would move poses, squared, from which a stand is none
-_LEAST = 1e-4  # [m] deviation of a reading
+_NARROWEST = 1e-4  # sds by the model that readings scatter by at least
 _FEWEST = 10  # readings of a scan that tell a pose
 
 
@@ -47,7 +47,7 @@ def creeping_stands(shots: Shots) -> Mapping[str, Sequence[float]]:
     some, stand = some_scans(shots, rows), stand[rows]
     seen = hits_of(some, (), 0)
     base = predict(some, (), seen, 0)
-    sd = np.maximum(np.nan_to_num(predict(some, (), seen, 0, noise=1.0) - base), _LEAST)
+    sd = deviations(some, seen, base)
     poses = moved_by_pose(some, seen)
     valid = usable_readings(some, seen, base)
     every = [np.flatnonzero(stand == one) for one in np.unique(stand)]
@@ -71,7 +71,7 @@ def _creeps(readings: FloatArray, valid: BoolArray, sd: FloatArray, poses: Float
         return None
     off, use, sd, poses = off[told], use[told], sd[told], poses[told]
     _, left = _moved(off, use, sd, poses, 0.0)
-    width = max(SIGMA_PER_MAD * float(np.nanmedian(np.abs(left))), _LEAST)
+    width = max(SIGMA_PER_MAD * float(np.nanmedian(np.abs(left))), _NARROWEST)
     rho = neighbours_correlation(left / width, np.abs(left) < OUTLIER * width)
     moved, _ = _moved(off, use, width * sd, poses, rho)
     return moved > _CREEPS * 3 * len(told)

@@ -23,6 +23,7 @@ _FAN, _MORE = 682, 2.0  # beams of such a scan; of scans of fewer beams there ma
 _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
 RATES = ("v", "w")  # [m/s, rad/s] of the chair, by the reference
+_LEAST = 1e-4  # [m] deviation of a reading
 _MOVE = 1e-3  # [m, rad] of a pose, to see how readings depend on it
 _GAP, _LONG = 0.3, 3.0  # [s], and usual times between poses, from which some are missing
 _STAYS = 0.02  # [m, rad] from pose to pose within which the chair may have stood meanwhile
@@ -301,6 +302,11 @@ def predict(
     chain = effects.build_laser(shaping, np.random.default_rng(seed))
     mean = read(shots, seen, chain, np.full_like(seen.ranges, noise))
     return np.where(np.isfinite(mean), mean, np.nan)
+
+
+def deviations(shots: Shots, seen: BeamHits, base: FloatArray) -> FloatArray:
+    """Return the sds (k, b) [m] of readings of mean base (k, b) [m] by the model, the least where nothing is met."""
+    return np.maximum(np.nan_to_num(predict(shots, (), seen, 0, noise=1.0) - base), _LEAST)
 
 
 def moved_by_pose(shots: Shots, seen: BeamHits, base: FloatArray | None = None) -> FloatArray:

@@ -34,10 +34,9 @@ def stands_averaged(times: FloatArray, poses: FloatArray, creeping: Sequence[flo
     pauses = np.flatnonzero(np.diff(times) > _PAUSE) + 1
     cuts = np.union1d(np.flatnonzero((step > _STEP).any(axis=1)) + 1, pauses)
     apart = {0, len(times), *pauses.tolist()}  # nobody drove there
-    out = poses.copy()
+    out, inside = poses.copy(), np.clip(creeping, times[0], times[-1])
     for rows in np.split(np.arange(len(times)), cuts):
         still = rows[_still(poses[rows], jitter, rows[0] not in apart, rows[-1] + 1 not in apart)]
-        inside = np.clip(creeping, times[0], times[-1])
         if len(still) and ((inside >= times[still[0]]) & (inside <= times[still[-1]])).any():
             continue
         if len(still) >= max(_FEWEST, _MOSTLY * len(rows)) and _stands(poses[still], jitter):

@@ -35,7 +35,7 @@ from kurumaisu.critic.ranges.noise.shared_errors import (
 )
 from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence, pose_evidence
 from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
-from kurumaisu.critic.ranges.scans.beams import Shots, model_effects_with, moved_by_pose, predict, some_scans
+from kurumaisu.critic.ranges.scans.beams import Shots, deviations, model_effects_with, moved_by_pose, some_scans
 from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
 from kurumaisu.critic.ranges.scans.map_changes import map_change
 from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
@@ -52,7 +52,6 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _ROUNDS = 3
 _SHIFTS = 2  # times that poses are sought by the scans
-_LEAST = 1e-4  # [m] deviation of a reading
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
 
 
@@ -117,8 +116,7 @@ class Assembly:
         self.residual = unrounded(shots.measured) - self.marks.base + self.moved
 
     def _trust(self) -> BeamNoise:
-        one = predict(self.shots, (), self.marks.seen, 0, noise=1.0) - self.marks.base
-        sd = np.maximum(np.nan_to_num(one), _LEAST)  # a beam that meets nothing has none
+        sd = deviations(self.shots, self.marks.seen, self.marks.base)
         smooth = self._on_smooth_path()[:, np.newaxis]
         trust = usable_readings(self.shots, self.marks.seen, self.marks.base)
         return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
@@ -383,10 +381,10 @@ class Assembly:
 
     def random_sds(self, k: int, noise: ScanNoise) -> FloatArray:
         """Return the sds (q,) [m, rad] of what random_columns are of."""
-        own = own_pose_sds(noise)
-        shared = pose_sds(noise) if self.layout.stand[k] >= 0 else lasting_sds(noise)
-        count = 0 if self.layout.stand[k] >= 0 else self.hats[k].weights.shape[1]
-        return np.concatenate([[noise.common_sd], shared, np.tile(own, count)])
+        if self.layout.stand[k] >= 0:
+            return np.concatenate([[noise.common_sd], pose_sds(noise)])
+        own = np.tile(own_pose_sds(noise), self.hats[k].weights.shape[1])
+        return np.concatenate([[noise.common_sd], lasting_sds(noise), own])
 
     def origins(self) -> tuple[FloatArray, FloatArray]:
         """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
