@@ -165,7 +165,7 @@ def test_a_slow_robot_is_no_md100_where_it_says_so():
     assert "chair" not in " ".join([said.story.headline, *said.story.details])
     guessed = criticise_arrays({"drive": tables(SLOW)}, only=["base.gain_v"])
     assert (guessed.verdict.robot.kind, guessed.verdict.robot.assumed) == ("md100", True)
-    assert any("`robot:` in meta.yaml says" in detail for detail in guessed.story.details)
+    assert any("`robot:` in meta.yaml, or --robot, says" in detail for detail in guessed.story.details)
 
 
 def test_a_fast_one_that_says_nothing_is_taken_for_another_make():

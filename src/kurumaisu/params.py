@@ -194,8 +194,27 @@ def robot_of(top: settings.Section, folder: Path | None = None) -> Robot:
     return _robot(kind, said)
 
 
+def robot_called(word: str) -> Robot:
+    """Return the robot that the command line says: as robot_of, but files are where it says.
+
+    Raise Error naming the word, or file and key.
+    """
+    if word.endswith(".yaml"):
+        said = settings.load(Path(word))
+        return _robot(said.text("kind"), said)
+    if word in robot_kinds() and settings.load(shipped(f"{_ROBOTS}/{word}.yaml")).text("driven_by") == "wheels":
+        example = f"{{kind: {word}, radius: METRES, track: METRES}}"
+        raise Error(f"{word}: its wheels are not known: give a .yaml file that says {example}")
+    return _robot(word, settings.Section({}, told(word)))
+
+
+def robot_kinds() -> list[str]:
+    """Return the names of the robots of launch/robots/."""
+    return sorted(path.stem for path in shipped(_ROBOTS).glob("*.yaml"))
+
+
 def _robot(kind: str, said: settings.Section) -> Robot:
-    names = sorted(path.stem for path in shipped(_ROBOTS).glob("*.yaml"))
+    names = robot_kinds()
     if kind not in names:
         near = f"{hint(kind, names)} " if nearest(kind, names) else ""
         raise said.error("kind", f"there is no robot {told(kind)}; {near}there are: {', '.join(names)}")

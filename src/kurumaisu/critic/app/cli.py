@@ -95,7 +95,9 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         raise Error(f"{options.recordings[0]}: contains no recording")
     ids = effect_ids(options.only, options.without)
     excerpt = Excerpt(options.start, options.stop, tuple(options.without_rows))
-    asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, not options.no_slam, excerpt)
+    slam = not options.no_slam
+    robot = options.robot
+    asked = Job(Path(), Path(), "", options.model, options.runs, ids, options.seed, slam, excerpt, robot)
     if len(found) == 1:
         return [replace(asked, recording=found[0], output=options.output, name=found[0].name)]
     return [

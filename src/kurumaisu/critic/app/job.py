@@ -16,7 +16,7 @@ from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error, one_line
-from kurumaisu.params import shipped
+from kurumaisu.params import Robot, shipped
 
 # What a shell sees; 2 is a wrong command line (argparse), 130 Ctrl-C.
 ERROR = 1
@@ -29,7 +29,8 @@ class Job:
 
     name: for the table; model: None takes the recording's, else the package's; runs: only these, empty takes all;
     ids: effects that may be named, None takes all; seed: of the particle filter that makes a missing reference;
-    slam: whether SLAM is run with both models; excerpt: what of each run is used.
+    slam: whether SLAM is run with both models; excerpt: what of each run is used; robot: which it is, None: as the
+    recording says.
     """
 
     recording: Path
@@ -41,6 +42,7 @@ class Job:
     seed: int = 1
     slam: bool = False
     excerpt: Excerpt = WHOLE
+    robot: Robot | None = None
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ def run(job: Job, progress: Callable[[str], None]) -> Outcome:
 def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:
     """Read, criticise and write into the job's folder. Raise Error naming what is wrong with the input."""
     progress(f"reading {job.recording}")
-    recording = with_reference(read_recording(job.recording, job.runs, job.excerpt), job.seed, progress)
+    read = read_recording(job.recording, job.runs, job.excerpt, job.robot)
+    recording = with_reference(read, job.seed, progress)
     model = job.model or recording.model or shipped("launch/md100.yaml")
     criticism = pipeline.criticise(
         recording, model, progress, assume_law=job.model is not None, ids=job.ids, slam=job.slam

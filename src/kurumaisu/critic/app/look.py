@@ -12,7 +12,7 @@ import numpy as np
 
 from kurumaisu import program
 from kurumaisu.critic.app.display import cells, printable
-from kurumaisu.critic.app.options import add_span, name_list
+from kurumaisu.critic.app.options import add_robot, add_span, name_list
 from kurumaisu.critic.bags.containers import is_bag
 from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
@@ -27,6 +27,7 @@ from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
 from kurumaisu.critic.data.wheel_reader import JOINTS
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error, failed
+from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
 
 _DESCRIPTION = """\
@@ -64,19 +65,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Print what there is; return 0, or 1 for what cannot be read or used."""
     options = _parser().parse_args(arguments)
     try:
-        for line in look(options.recording, options.runs, Excerpt(options.start, options.stop)):
+        excerpt = Excerpt(options.start, options.stop)
+        for line in look(options.recording, options.runs, excerpt, options.robot):
             print(printable(line), flush=True)
     except Error as error:
         return failed("critic look", error)
     return 0
 
 
-def look(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Iterator[str]:
-    """Yield lines for people about the runs of a recording; excerpt: what of each is used.
+def look(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE, robot: Robot | None = None) -> Iterator[str]:
+    """Yield lines for people about the runs of a recording; excerpt: what of each is used; robot: which it is.
 
     Raise Error for what cannot be read.
     """
-    meta = meta_of(path)
+    meta = meta_of(path, robot)
     faults = Faults()
     runs = []
     for source in chosen(sources(path), wanted):
@@ -90,13 +92,13 @@ def look(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> It
         runs.append(run)
         yield from _parts(run)
     yield ""
-    yield from (f"data: {note}" for note in faults.notes)
+    yield from (f"data: {note}" for note in (*meta.notes, *faults.notes))
     yield from missing(runs, meta)
 
 
 def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
     """Yield, for each verdict, whether the runs serve for it, or what is missing."""
-    assumed = "not said: an MD-100, or one without voltages, is assumed; see `robot` in docs/recording.md"
+    assumed = "not said: an MD-100, or one without voltages, is assumed; --robot, or `robot` in meta.yaml, says which"
     yield f"robot: {meta.robot.kind if meta.robot else assumed}"
     inputs = [run for run in runs if run.command or run.voltage]
     posed = [run for run in inputs if run.pose or run.odom]
@@ -193,5 +195,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("recording", type=Path, metavar="RECORDING", help=what)
     words = "only these runs; patterns like drive_* are allowed"
     parser.add_argument("--runs", type=name_list, default=(), metavar="A,B", help=words)
+    add_robot(parser)
     add_span(parser)
     return parser

@@ -12,6 +12,7 @@ from kurumaisu import program
 from kurumaisu.critic.data import excerpt
 from kurumaisu.critic.values.version import version
 from kurumaisu.errors import Error
+from kurumaisu.params import robot_called, robot_kinds
 
 _Read = TypeVar("_Read")
 _DESCRIPTION = """\
@@ -21,6 +22,7 @@ the model, name what is missing, or abstain. Writes verdict.json, extended.yaml
 _EPILOG = """\
 examples:
   critic drive.bag                       one drive: criticism/report.html
+  critic drive.bag --robot velocity      of a robot that is no MD-100
   critic drives/ --runs 'monday_*'       some drives of a recording
   critic drives/ --only 'base.lag_*,base.delay'
                                          look for these effects only
@@ -63,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     add("recordings", type=Path, nargs="+", metavar="RECORDING", help=what)
     add("-o", "--output", type=Path, default=Path("criticism"), metavar="FOLDER", help="output folder (criticism)")
     add("--model", type=Path, metavar="FILE", help="model to criticise (the recording's, else md100.yaml)")
+    add_robot(parser)
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add_span(parser)
     rows = (
@@ -89,6 +92,15 @@ def _parser() -> argparse.ArgumentParser:
     add("-q", "--quiet", action="store_true", help="show no progress")
     add("--version", action="version", version=f"critic {version()}")
     return parser
+
+
+def add_robot(parser: argparse.ArgumentParser) -> None:
+    """Add --robot."""
+    words = (
+        f"which robot it is: {', '.join(robot_kinds())}, or a .yaml file; those on wheels need a file that says "
+        "{kind: diff_drive, radius: METRES, track: METRES}; holds in place of `robot` in meta.yaml"
+    )
+    parser.add_argument("--robot", type=_argument(robot_called), metavar="NAME_OR_FILE", help=words)
 
 
 def add_span(parser: argparse.ArgumentParser) -> None:

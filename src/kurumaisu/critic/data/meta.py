@@ -20,7 +20,7 @@ class Meta:
     """What meta.yaml says. train, test: names of runs, empty where left out; topics: topic of each part.
 
     frames: of tf, the reference is where the second is in the first; command_hold [s]: for how long a command holds,
-    None: until the next.
+    None: until the next. notes: what was overridden, in words.
     """
 
     model: Path | None = None
@@ -34,6 +34,7 @@ class Meta:
     wheels: Wheels | None = None
     command_hold: float | None = None
     robot: Robot | None = None
+    notes: tuple[str, ...] = ()
 
 
 def recording_of_meta(
@@ -50,18 +51,20 @@ def recording_of_meta(
         laser=meta.laser,
         truth=meta.truth,
         robot=meta.robot,
-        problems=tuple(faults.notes),
+        problems=(*meta.notes, *faults.notes),
         invalid=tuple(faults.invalid),
     )
 
 
-def read_meta(path: Path) -> Meta:
+def read_meta(path: Path, robot: Robot | None = None) -> Meta:
     """Read meta.yaml; a file named in it lies beside it. A model may also be one of the package's own.
 
-    Raise Error naming file and key.
+    robot: holds in place of the one that it names. Raise Error naming file and key.
     """
     top = settings.load(path)
-    robot = robot_of(top, path.parent) if "robot" in top else None
+    own = robot_of(top, path.parent) if "robot" in top else None
+    notes = () if robot is None or own in (None, robot) else (_overridden(path.name, own, robot),)
+    robot = robot or own
     meta = Meta(
         model=_file(top, "model", path.parent, "launch") if "model" in top else None,
         world=_file(top, "world", path.parent, "") if "world" in top else None,
@@ -74,12 +77,18 @@ def read_meta(path: Path) -> Meta:
         wheels=_wheels(top.section("wheels"), robot) if "wheels" in top else None,
         command_hold=top.number("command_hold", above=0) if "command_hold" in top else None,
         robot=robot,
+        notes=notes,
     )
     top.end()
     both = sorted(set(meta.train) & set(meta.test))
     if both:
         raise top.error("test", f"{told(both[0])} is in train too: a run that was fitted cannot judge")
     return meta
+
+
+def _overridden(name: str, own: Robot, robot: Robot) -> str:
+    said = (", ".join(f"{key}: {value}" for key, value in each.said.items()) for each in (own, robot))
+    return "{}: robot: {{{}}}: the command line says {{{}}}, which holds".format(name, *said)
 
 
 def _file(top: settings.Section, key: str, folder: Path, package_folder: str) -> Path:

@@ -23,20 +23,23 @@ from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
+from kurumaisu.params import Robot
 
 META = "meta.yaml"
 
 
-def read_recording(path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE) -> Recording:
+def read_recording(
+    path: Path, wanted: Sequence[str] = (), excerpt: Excerpt = WHOLE, robot: Robot | None = None
+) -> Recording:
     """Read a folder of runs, one folder of CSV tables, one bag or one log.
 
     NAME.bag may have been split into NAME_0.bag, NAME_1.bag, ...
     wanted: names of runs, or patterns like drive_*; only those are read and used; empty takes all.
-    excerpt: what of each run is used.
+    excerpt: what of each run is used. robot: which it is, in place of what meta.yaml says.
     Raise Error naming file, line and column, topic or key for anything that cannot be read, and saying what
     is missing when nothing can be done with what was read.
     """
-    meta = meta_of(path)
+    meta = meta_of(path, robot)
     faults = Faults()
     laser = meta.laser
     runs = []
@@ -58,19 +61,22 @@ def is_log(path: Path) -> bool:
     return is_rawlog(path) or is_carmen(path)
 
 
-def meta_of(path: Path) -> Meta:
+def meta_of(path: Path, robot: Robot | None = None) -> Meta:
     """Return what meta.yaml says of a recording: the one inside a folder, else the one beside a bag or a rawlog.
 
-    One beside it speaks of all that lies there: which runs are fitted does not concern a single one.
+    One beside it speaks of all that lies there: which runs are fitted does not concern a single one. robot: as
+    read_meta has it.
     Raise Error naming file and key, and where there is no such recording.
     """
     if not path.exists() and not is_split(path):
         raise Error(f"{path}: there is no such file or folder")
     inside, beside = path / META, path.resolve().parent / META
     if path.is_dir() and inside.exists():
-        return read_meta(inside)
+        return read_meta(inside, robot)
     alone = is_split(path) or is_bag(path) or is_log(path)
-    return replace(read_meta(beside), train=(), test=()) if alone and beside.exists() else Meta()
+    if alone and beside.exists():
+        return replace(read_meta(beside, robot), train=(), test=())
+    return Meta(robot=robot)
 
 
 def sources(path: Path) -> list[Path]:

@@ -46,7 +46,7 @@ def _worded(sentence: str, robot: Robot) -> str:
 def _assumption(robot: Robot) -> str:
     why = "nothing was asked of it that its voltages cannot say" if robot.voltages else "it was asked for more"
     what = f"{robot.name}, as {why}" if robot.voltages else f'"{robot.name}", as {why} than an MD-100 can do'
-    return f"The robot was taken for {what}; `robot:` in meta.yaml says which it is."
+    return f"The robot was taken for {what}; `robot:` in meta.yaml, or --robot, says which it is."
 
 
 def _in_words(found: Multipliers, robot: Robot) -> str:
