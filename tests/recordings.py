@@ -210,6 +210,20 @@ class Bag:
             twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=self.twist(v, w), covariance=none),
         )
 
+    def imu(self, t, values):
+        """values: rates, and accelerations if there are any."""
+        rates, felt = values[:3], values[3:]
+        return self.make(
+            "sensor_msgs/msg/Imu",
+            header=self.header(t),
+            orientation=self.make("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0),
+            orientation_covariance=np.full(9, -1.0),
+            angular_velocity=self.vector(*rates),
+            angular_velocity_covariance=np.zeros(9),
+            linear_acceleration=self.vector(*felt),
+            linear_acceleration_covariance=np.full(9, 0.0 if len(felt) else -1.0),
+        )
+
     def scan(self, t, ranges):
         fan = {"angle_min": -2.0, "angle_max": -1.4, "angle_increment": 0.1, "scan_time": 0.1}
         return self.make(

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.clean import Faults, Table, clean, spared
 from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run
-from kurumaisu.critic.data.csv_reader import OPTIONAL, QUERY, REQUIRED, check_queries
+from kurumaisu.critic.data.csv_reader import IMU, OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.data.meta import Meta, recording_of_meta
 from kurumaisu.critic.data.odometry import with_wheels
 from kurumaisu.critic.data.reading import require_use, split
@@ -22,7 +22,7 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run, Series, run_of_parts
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error
-from kurumaisu.params import Robot, shipped
+from kurumaisu.params import shipped
 from kurumaisu.types import FloatArray
 
 Tables = Mapping[str, ArrayLike]
@@ -41,8 +41,9 @@ def criticise_arrays(
 
     runs: by name, tables whose first column is t [s]: command (n, 3) of t, v, w; voltage (n, 3) of t, v_f, v_s, or
     (n, 5) with the v, w that they stand for; pose (n, 4) of t, x, y, theta, or (n, 3) without theta; odom (n, 6) of t,
-    x, y, theta, v, w, or (n, 4) without v, w; wheels or wheel_rates (n, 3) of t, left, right; scan (n, 1 + beams);
-    query (n, 2) of t0, t1; any other name: a covariate, (n, 2). SI units, radians. meta: what meta.yaml would say.
+    x, y, theta, v, w, or (n, 4) without v, w; wheels or wheel_rates (n, 3) of t, left, right; imu (n, 2) of t, w, or
+    (n, 4) of t, wx, wy, wz, or (n, 7) with ax, ay, az; scan (n, 1 + beams); query (n, 2) of t0, t1; any other name: a
+    covariate, (n, 2). SI units, radians. meta: what meta.yaml would say.
     only, without: ids or patterns of effects; seed: of the particle filter that makes a missing reference.
     Raise Error naming run and table, or effect, for what cannot be used.
     """
@@ -54,7 +55,7 @@ def criticise_arrays(
 def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording:
     """Return arrays as a recording, cleaned as tables are. Raise Error naming what does not fit."""
     faults = Faults()
-    made = [run_of(run, tables, faults, meta.command_hold, meta.robot) for run, tables in runs.items()]
+    made = [run_of(run, tables, faults, meta) for run, tables in runs.items()]
     if not made:
         raise Error(f"{name}: no run is given")
     for run in made:
@@ -64,10 +65,10 @@ def recording_of(name: str, runs: Mapping[str, Tables], meta: Meta) -> Recording
     return recording_of_meta(name, made, meta, faults, train=train, test=test)
 
 
-def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None, robot: Robot | None = None) -> Run:
-    """Return the tables of one drive as a run; faults gets what was found wrong, hold: as completed has it.
+def run_of(name: str, tables: Tables, faults: Faults, meta: Meta | None = None) -> Run:
+    """Return the tables of one drive as a run; faults gets what was found wrong; meta: of robot, imu and commands.
 
-    robot: whose wheels they tell of. Raise Error naming a misshapen table.
+    Raise Error naming a misshapen table.
     """
     parts: dict[str, Series | None] = {}
     covariates: dict[str, Series] = {}
@@ -80,13 +81,15 @@ def run_of(name: str, tables: Tables, faults: Faults, hold: float | None = None,
             continue
         columns = _columns(where, part, rows.shape[1] - 1)
         table = Table(where, rows[:, 0], rows[:, 1:], columns, "row", 0)
-        series = clean(table, faults, ranges=part == "scan")
+        series = spared(table, faults) if part == "imu" else clean(table, faults, ranges=part == "scan")
         if part in REQUIRED:
             parts[part] = series
         elif series is not None:
             covariates[part] = series
-    lost = with_wheels(name, name, parts, robot, faults)
-    return completed(replace(run_of_parts(name, parts, covariates), queries=queries, aside=lost), hold, faults)
+    meta = meta or Meta()
+    lost = with_wheels(name, name, parts, meta.robot, faults)
+    run = replace(run_of_parts(name, parts, covariates), queries=queries, aside=lost)
+    return completed(run, meta.command_hold, faults, meta.imu)
 
 
 def _rows(where: str, given: ArrayLike) -> FloatArray:
@@ -106,7 +109,8 @@ def _columns(where: str, part: str, count: int) -> tuple[str, ...]:
     if part == "covariate":
         raise Error(f"{where}: give each covariate under its own name")
     required = REQUIRED.get(part, (part,))
-    for columns in (required, (*required, *OPTIONAL.get(part, ()))):
+    known = IMU if part == "imu" else (required, (*required, *OPTIONAL.get(part, ())))
+    for columns in known:
         if len(columns) == count:
             return columns
-    raise Error(f"{where}: must have the columns t, {', '.join(required)}; it has {count + 1} columns")
+    raise Error(f"{where}: must have the columns t, {', '.join(known[0])}; it has {count + 1} columns")

@@ -18,7 +18,7 @@ from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
 from kurumaisu.critic.bags.topics import Topic
-from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, read_bag_topics, resolve
+from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, read_bag_topics, wanted_of
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
@@ -36,7 +36,6 @@ rates, gaps, clocks; what meta.yaml could map; and what is missing for which
 verdict. Nothing is fitted, and nothing written."""
 _FASTER = 5.0  # times the usual interval is a gap
 _ENOUGH = 60.0  # [s] of motion, below which small effects stay hidden
-_IMU = "sensor_msgs/Imu"
 
 
 @dataclass(frozen=True)
@@ -102,11 +101,15 @@ def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
     yield f"robot: {meta.robot.kind if meta.robot else assumed}"
     inputs = [run for run in runs if run.command or run.voltage]
     posed = [run for run in inputs if run.pose or run.odom]
-    if posed:
+    turned = bool(runs) and all(run.imu and not run.pose and not run.scan for run in runs)
+    if turned:
+        yield "base: how far it turns, against the imu; how far it drives is not known: that takes poses"
+    elif posed:
         moving = _moving(posed)
         measured = all(run.pose for run in posed)
         source = "measured poses" if measured else "odometry: what the wheels do on the floor does not show"
-        yield f"base: {moving:.0f} s of motion, against {source}"
+        beside = ", whose headings the imu checks" if measured and all(run.imu for run in posed) else ""
+        yield f"base: {moving:.0f} s of motion, against {source}{beside}"
         if moving < _ENOUGH:
             yield f"  small effects may stay hidden: {_ENOUGH:.0f} s of motion, both ways and both turns, show most"
     elif any(run.odom and run.pose for run in runs):
@@ -148,7 +151,7 @@ def _moving(runs: Sequence[Run]) -> float:
 def _topics(source: Path, meta: Meta) -> Generator[str, None, dict[str, Topic]]:
     """Yield the table of a bag's topics, and what meta.yaml could map; return what was read of them, at once."""
     found = survey(source)
-    roles = {topic: part for part, topic in resolve(meta.topics).items()}
+    roles = {topic: part for part, topic in wanted_of(source, meta).items()}
     topics: dict[str, Topic] = {}
     try:
         topics = read_bag_topics(source, meta, also=[topic.name for topic in found if topic.serves])
@@ -166,9 +169,7 @@ def _topics(source: Path, meta: Meta) -> Generator[str, None, dict[str, Topic]]:
 
 
 def _note(kind: str) -> str:
-    if kind == shown(JOINTS):
-        return "could be wheels"
-    return "not used" if kind == _IMU else ""
+    return "could be wheels" if kind == shown(JOINTS) else ""
 
 
 def _parts(run: Run) -> Iterator[str]:

@@ -68,9 +68,8 @@ def _parser() -> argparse.ArgumentParser:
     add_robot(parser)
     add("--runs", type=name_list, default=(), metavar="A,B", help="only these runs; patterns like drive_* are allowed")
     add_span(parser)
-    rows = (
-        "leave out rows of a part (pose, odom, scan, command, voltage), or of all that was measured, between two times"
-    )
+    parts = "pose, odom, scan, imu, command, voltage"
+    rows = f"leave out rows of a part ({parts}), or of all that was measured, between two times"
     add(
         "--without-rows",
         type=_argument(excerpt.gap),

@@ -14,12 +14,13 @@ from kurumaisu.critic.values.recording import Fan
 from kurumaisu.plausible import yaw_or_nan
 
 # Parts of a run that have a type of their own; any other topic is a covariate.
-PARTS = ("command", "voltage", "pose", "odom", "scan")
+PARTS = ("command", "voltage", "pose", "odom", "imu", "scan")
 COLUMNS = {
     "command": ("v", "w"),
     "voltage": ("v_f", "v_s", "v", "w"),
     "pose": ("x", "y", "theta"),
     "odom": ("x", "y", "theta", "v", "w"),
+    "imu": ("wx", "wy", "wz", "ax", "ay", "az"),
 }
 # The field of a message that gives the covariate its plain name; others are called topic.field.
 MAIN_FIELD = {
@@ -87,6 +88,14 @@ def _yaw(q: Any) -> float:
     return yaw_or_nan(q.x, q.y, q.z, q.w)
 
 
+def _imu(message: Any) -> tuple[float, ...]:
+    """Return rates and accelerations about the axes of the sensor; a covariance of -1 says that one is not measured."""
+    w, a = message.angular_velocity, message.linear_acceleration
+    rates = (w.x, w.y, w.z) if message.angular_velocity_covariance[0] >= 0 else (math.nan,) * 3
+    felt = (a.x, a.y, a.z) if message.linear_acceleration_covariance[0] >= 0 else (0.0,) * 3
+    return (*rates, *(part if math.isfinite(part) else 0.0 for part in felt))
+
+
 def _scan(message: Any) -> ScanRow:
     ranges = np.round(np.asarray(message.ranges, dtype=np.float64), RANGE_DECIMALS)
     # REP 117 for drivers that predate it: below the limit there is no reading, above it no return.
@@ -139,6 +148,7 @@ _CONVERTERS: dict[str, dict[str, Converter]] = {
         "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose),
         "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose),
     },
+    "imu": {"sensor_msgs/msg/Imu": _imu},
     "scan": {"sensor_msgs/msg/LaserScan": _scan},
 }
 _STEERED = (

@@ -18,11 +18,12 @@ from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
 from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
-from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.clean import Faults, Table, clean, spared
 from kurumaisu.critic.data.counters import Spans
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS
 from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
+from kurumaisu.critic.imu.yaw_rate import UNUSED
 from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
@@ -35,6 +36,7 @@ TOPICS = {
     "voltage": "voltages",
     "pose": "ground_truth",
     "odom": "odom",
+    "imu": "imu",
     "scan": "scan",
     "battery": "battery",
     "temperature": "temperature",
@@ -60,13 +62,13 @@ def read_bag_run(
     A message's time is its header's stamp, or where it has none, when the bag received it.
     Raise Error naming file, topic and type for what cannot be read.
     """
-    wanted = _own(meta)
+    wanted = wanted_of(path, meta, faults)
     read = read_bag_topics(path, meta, put_aside) if topics is None else topics
     found = {part: read[topic] for part, topic in wanted.items() if topic in read}
     if "command" not in found and SCRIPTED in read:
         found["command"] = read[SCRIPTED]
     _name_absent(path, sorted(set(_parts(meta.topics)) & set(wanted) - set(found)), wanted, faults)
-    _check_clocks(path.name, found, faults)
+    _check_clocks(path.name, {part: topic for part, topic in found.items() if part != "imu"}, faults)
     series: dict[str, Series | None] = {}
     fan, covariates = None, {}
     for part, topic in found.items():
@@ -76,7 +78,8 @@ def read_bag_run(
             series["scan"], fan = _scan(where, topic, keep, faults, aside=put_aside is not None)
         elif part in PARTS:
             columns, rows = _said(part, topic, keep)
-            series[part] = clean(Table(where, topic.times()[keep], rows, columns, "message", 1), faults)
+            table = Table(where, topic.times()[keep], rows, columns, "message", 1)
+            series[part] = spared(table, faults) if part == "imu" else clean(table, faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
     lost = _work_out(path, meta, series, faults)
@@ -114,7 +117,7 @@ def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], Flo
     if topic.type == messages.FIX:
         rows = _east_and_north(rows)
     # Fields at 0 throughout were not filled in.
-    needed = {"voltage": 2, "odom": 3}.get(part, rows.shape[1])
+    needed = {"voltage": 2, "odom": 3, "imu": 3}.get(part, rows.shape[1])
     if not np.nan_to_num(rows[:, needed:]).any():
         rows = rows[:, :needed]
     return messages.COLUMNS[part][: rows.shape[1]], rows
@@ -143,7 +146,7 @@ def read_bag_topics(
 
     put_aside: as read_bag_run has it. Raise Error naming file, topic and type for what cannot be read.
     """
-    wanted = _own(meta)
+    wanted = wanted_of(path, meta)
     shared = [topic for topic in wanted.values() if list(wanted.values()).count(topic) > 1]
     if shared:
         raise Error(f"topics: {shared[0]} is assigned to two parts of a run")
@@ -163,6 +166,27 @@ def read_bag_topics(
     times = dict.fromkeys(also, lambda _: lambda _: ())
     parts = {topic: partial(converter, part) for part, topic in wanted.items()}
     return read_topics(path, {**times, SCRIPTED: of_script, **parts})
+
+
+def wanted_of(path: Path, meta: Meta, faults: Faults | None = None) -> dict[str, str]:
+    """Return the absolute topic of each part and covariate that is read of a bag.
+
+    The only Imu is that of the robot, whatever it is called; faults is told of several, of which none is taken.
+    """
+    own = _own(meta)
+    if "imu" in _parts(meta.topics) and meta.imu != UNUSED:
+        return own
+    usual = own.pop("imu")
+    found = [] if meta.imu == UNUSED else survey(path)
+    some = [topic for topic in found if "imu" in topic.serves and topic.count and topic.name not in own.values()]
+    chosen = some if len(some) == 1 else [topic for topic in some if topic.name == usual]
+    if chosen:
+        return {**own, "imu": chosen[0].name}
+    if some and faults is not None:
+        one = f"topics: {_yaml({**meta.topics, 'imu': some[0].name})}"
+        which = "which imu is the robot's is not said, so none is used"
+        faults.add(f"{path.name}: {which}: meta.yaml could say {one}; there are: {listed(some)}")
+    return own
 
 
 def _aside(row: ScanRow, put_aside: PutAside) -> ScanRow:

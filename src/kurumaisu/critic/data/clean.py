@@ -89,6 +89,15 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
 
 
+def spared(table: Table, faults: Faults) -> Series | None:
+    """Return the rows of a part that nobody need have, as clean does: where most are of no use, it is left out."""
+    own = Faults()
+    series = clean(table, own)
+    for note in own.notes:
+        faults.add(f"{note}: not used" if note in own.invalid else note)
+    return None if own.invalid else series
+
+
 def _of_sane_size(table: Table, *, ranges: bool) -> BoolArray:
     """Return which rows have no number that is beyond all that there is, (n,); inf and nan are none."""
     largest = _LARGEST_COVARIATE if _KNOWN.isdisjoint(table.columns) else LARGEST

@@ -10,22 +10,25 @@ import numpy as np
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.headings import Guide, with_headings
 from kurumaisu.critic.data.odometry import COLUMNS, driven_by, rates_between
+from kurumaisu.critic.imu.yaw_rate import heading, with_yaw_rate
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 
 
-def completed(run: Run, hold: float | None, faults: Faults) -> Run:
+def completed(run: Run, hold: float | None, faults: Faults, axis: str | None = None) -> Run:
     """Return a run with all columns of odometry and pose; hold: for how long a command holds [s], None: until the next.
 
-    faults gets what was worked out, and what could not be.
+    axis: of the imu that is up, as with_yaw_rate has it. faults gets what was worked out, and what could not be.
     """
     odom = run.odom
     if odom is not None and odom.columns != COLUMNS:
         poses = np.column_stack([odom.column(name) for name in COLUMNS[:3]])
         odom = Series(odom.t, np.column_stack([poses, rates_between(odom.t, poses)]), COLUMNS)
     command = run.command if run.command is None or hold is None else _ended(run.command, hold)
-    run = replace(run, odom=odom, command=command)
+    run, words = with_yaw_rate(replace(run, odom=odom, command=command), axis)
+    for line in words:
+        faults.add(line)
     if run.pose is None or "theta" in run.pose.columns:
         return run
     guide = _guide(run)
@@ -52,6 +55,16 @@ def _ended(command: Series, hold: float) -> Series:
 
 
 def _guide(run: Run) -> Guide | None:
+    """Return what says best how a robot turned, and whether it drove ahead."""
+    plain = _guide_without_imu(run)
+    if run.imu is None or plain is None:
+        return plain
+    t = run.imu.t
+    ahead = plain.v[np.clip(np.searchsorted(plain.t, t, side="right") - 1, 0, None)]
+    return Guide("the imu", t, heading(run.imu), ahead)
+
+
+def _guide_without_imu(run: Run) -> Guide | None:
     if run.odom is not None:
         return Guide("the odometry", run.odom.t, run.odom.column("theta"), run.odom.column("v"))
     if run.command is None:

@@ -18,8 +18,9 @@ FARTHEST_MEDIAN = 100.0
 def usable(run: Run) -> bool:
     """Tell whether a run says something about base or laser."""
     driven = run.command is not None or run.voltage is not None
-    followed = run.pose is not None or run.odom is not None or run.queries is not None
-    return run.scan is not None or (driven and followed) or (run.odom is not None and run.pose is not None)
+    measured = run.pose is not None or run.imu is not None
+    followed = measured or run.odom is not None or run.queries is not None
+    return run.scan is not None or (driven and followed) or (run.odom is not None and measured)
 
 
 def check_run(run: Run, laser: LaserMount | None, faults: Faults) -> None:

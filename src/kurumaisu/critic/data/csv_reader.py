@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
-from kurumaisu.critic.data.clean import Faults, Table, clean
+from kurumaisu.critic.data.clean import Faults, Table, clean, spared
 from kurumaisu.critic.data.odometry import with_wheels
 from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
+from kurumaisu.critic.imu.yaw_rate import ACCELERATIONS, RATE, RATES
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
 from kurumaisu.params import Robot
@@ -33,11 +34,18 @@ REQUIRED: dict[str, tuple[str, ...]] = {
     "odom": ("x", "y", "theta"),
     "wheels": ("left", "right"),
     "wheel_rates": ("left", "right"),
+    "imu": (),
     "scan": (),
     "covariate": (),
 }
 # Columns that belong to a table when it has them; any other one is a covariate.
-OPTIONAL: dict[str, tuple[str, ...]] = {"voltage": ("v", "w"), "pose": ("theta",), "odom": ("v", "w")}
+OPTIONAL: dict[str, tuple[str, ...]] = {
+    "voltage": ("v", "w"),
+    "pose": ("theta",),
+    "odom": ("v", "w"),
+    "imu": (*RATE, *RATES, *ACCELERATIONS),
+}
+IMU = (RATE, RATES, (*RATES, *ACCELERATIONS))  # columns that it may have
 QUERY = "query"
 _TRAJECTORIES = ("pose", "odom")  # which may also be trajectories
 _HEADINGS = frozenset({"yaw", "heading", "th", "phi", "psi", "angle", "orientation", "rotation", "bearing"})
@@ -107,6 +115,8 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
         faults.add(f"{where}: column {column!r} is not read: it has no numbers")
     optional = tuple(name for name in OPTIONAL.get(part, ()) if name in columns)
     own = (*REQUIRED[part], *optional)
+    if part == "imu" and set(own).isdisjoint((*RATE, *RATES)):
+        raise Error(f"{path}:1: a rate is missing: w of the robot, or wx, wy, wz about the axes of the sensor [rad/s]")
     if part == "scan":
         own = tuple(f"r{i}" for i in range(sum(_is_beam(name) for name in columns)))
         missing = [name for name in own if name not in columns]
@@ -116,7 +126,8 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
     series = None
     if own:
         values = rows[:, [columns.index(name) for name in own]]
-        series = clean(Table(where, t, values, own, "line", 2), faults, ranges=part == "scan")
+        table = Table(where, t, values, own, "line", 2)
+        series = spared(table, faults) if part == "imu" else clean(table, faults, ranges=part == "scan")
     covariates = {}
     for name in columns:
         if name not in ("t", *own):

@@ -26,7 +26,7 @@ def write_csv_run(folder: Path, run: Run) -> None:
     except OSError as error:
         raise Error(f"{folder}: {error.strerror}") from error
     tables = {}
-    for part in ("command", "voltage", "pose", "odom", "scan"):
+    for part in ("command", "voltage", "pose", "odom", "imu", "scan"):
         series: Series | None = getattr(run, part)
         if series is not None:
             tables[part] = _text(("t", *series.columns), np.column_stack([series.t, series.values]))

@@ -15,6 +15,7 @@ from kurumaisu.types import BoolArray
 
 _HELD = ("command", "voltage")
 _MEASURED = ("pose", "odom", "scan")
+_BESIDE = ("imu",)  # measured, too, but no drive begins or ends with it
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ def gap(text: str) -> Gap:
     """Return the rows that [PART:]FROM..TO means. Raise Error for anything else."""
     part, colon, times = text.rpartition(":")
     start, dots, stop = times.partition("..")
-    if not dots or (colon and part not in (*_HELD, *_MEASURED)):
-        parts = ", ".join((*_MEASURED, *_HELD))
+    if not dots or (colon and part not in (*_HELD, *_MEASURED, *_BESIDE)):
+        parts = ", ".join((*_MEASURED, *_BESIDE, *_HELD))
         raise Error(f"must be FROM..TO or PART:FROM..TO in seconds, with a part of {parts}: {told(text)}")
     return Gap(part, moment(start), moment(stop))
 
@@ -94,7 +95,8 @@ def cut(run: Run, excerpt: Excerpt, faults: Faults) -> Run:
         raise Error(
             f"{run.name}: lasts from {first:.6f} to {last:.6f} s: nothing is left from {start:.6f} to {stop:.6f} s"
         )
-    parts = {name: _left(run, name, start, stop, excerpt.without, faults) for name in (*_HELD, *_MEASURED)}
+    names = (*_HELD, *_MEASURED, *_BESIDE)
+    parts = {name: _left(run, name, start, stop, excerpt.without, faults) for name in names}
     covariates = {name: _between(series, start, stop, held=False) for name, series in run.covariates.items()}
     queries = run.queries
     if queries is not None:
@@ -106,6 +108,7 @@ def cut(run: Run, excerpt: Excerpt, faults: Faults) -> Run:
         pose=parts["pose"],
         odom=parts["odom"],
         scan=parts["scan"],
+        imu=parts["imu"],
         covariates={name: series for name, series in covariates.items() if series is not None},
         queries=queries,
     )
@@ -117,7 +120,7 @@ def _left(run: Run, name: str, start: float, stop: float, without: tuple[Gap, ..
         return None
     part = _between(whole, start, stop, held=name in _HELD)
     for wanted in without:
-        if part is not None and (wanted.part == name or (not wanted.part and name in _MEASURED)):
+        if part is not None and (wanted.part == name or (not wanted.part and name not in _HELD)):
             inside = (part.t >= wanted.start.of(run)) & (part.t <= wanted.stop.of(run))
             part = _rows(part, ~inside)
     left_out = len(whole.t) - (0 if part is None else len(part.t))

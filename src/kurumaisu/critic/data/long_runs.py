@@ -65,6 +65,7 @@ def _piece(run: Run, name: str, start: float) -> Run:
         pose=_within(run.pose, start, end, held=False),
         odom=_within(run.odom, start, end, held=False),
         scan=_within(run.scan, start, end, held=False),
+        imu=_within(run.imu, start, end, held=False),
         covariates=kept,
         queries=queries,
     )

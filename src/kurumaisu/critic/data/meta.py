@@ -10,6 +10,8 @@ from pathlib import Path
 from kurumaisu import settings
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.odometry import Wheels
+from kurumaisu.critic.imu.mounting import AXES
+from kurumaisu.critic.imu.yaw_rate import UNUSED
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error, told
 from kurumaisu.params import MOST_BEAMS, Robot, robot_of, shipped
@@ -20,7 +22,7 @@ class Meta:
     """What meta.yaml says. train, test: names of runs, empty where left out; topics: topic of each part.
 
     frames: of tf, the reference is where the second is in the first; command_hold [s]: for how long a command holds,
-    None: until the next. notes: what was overridden, in words.
+    None: until the next. imu: which axis of it is up, or UNUSED. notes: what was overridden, in words.
     """
 
     model: Path | None = None
@@ -34,6 +36,7 @@ class Meta:
     wheels: Wheels | None = None
     command_hold: float | None = None
     robot: Robot | None = None
+    imu: str | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -77,6 +80,7 @@ def read_meta(path: Path, robot: Robot | None = None) -> Meta:
         wheels=_wheels(top.section("wheels"), robot) if "wheels" in top else None,
         command_hold=top.number("command_hold", above=0) if "command_hold" in top else None,
         robot=robot,
+        imu=_imu(top.section("imu")) if "imu" in top else None,
         notes=notes,
     )
     top.end()
@@ -124,6 +128,12 @@ def _truth(section: settings.Section) -> tuple[float, float]:
     truth = section.number("position_sd", at_least=0), section.number("heading_sd", at_least=0)
     section.end()
     return truth
+
+
+def _imu(section: settings.Section) -> str:
+    axis = section.text("axis", (*AXES, UNUSED))
+    section.end()
+    return axis
 
 
 def _names(top: settings.Section, key: str) -> tuple[str, ...]:

@@ -122,7 +122,7 @@ def read_run(
     put_aside, topics: of a bag, as read_bag_run has them.
     """
     run, mount = _read(source, meta, faults, put_aside, topics)
-    return completed(run, meta.command_hold, faults), mount
+    return completed(run, meta.command_hold, faults, meta.imu), mount
 
 
 def _read(
@@ -183,12 +183,13 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
             f"{path}: nothing to criticise a model with: {runs[0].name} has {_has(runs[0])}. "
             f"Needed are scans (scan.csv or {topic['scan']}), or commands or voltages "
             f"(command.csv, voltage.csv, {topic['command']} or {topic['voltage']}) "
-            f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']})"
+            f"together with poses (pose.csv, odom.csv, {topic['pose']} or {topic['odom']}) "
+            "or an imu (imu.csv, sensor_msgs/Imu)"
             + "".join(f"; {note}" for note in faults.notes if note not in told)
             + "".join(f"; {inventory(bag, meta)}" for bag in bags[:1])
         )
 
 
 def _has(run: Run) -> str:
-    parts = [part for part in ("command", "voltage", "pose", "odom", "scan") if getattr(run, part) is not None]
+    parts = [part for part in ("command", "voltage", "pose", "odom", "imu", "scan") if getattr(run, part) is not None]
     return f"only {' and '.join(parts)}" if parts else "no part of a run"

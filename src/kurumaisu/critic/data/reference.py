@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kurumaisu.critic.base.drive import driven
+from kurumaisu.critic.data.turning import turning_only, with_turning
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error
@@ -22,13 +23,15 @@ if TYPE_CHECKING:  # loading MRPT takes a third of a second, which a recording w
 def with_reference(recording: Recording, seed: int, progress: Progress) -> Recording:
     """Return the recording with a pose for every run that somebody drove, mapping those that have none.
 
-    Without scans the odometry is the reference of what was asked for. A run of which motions are to be predicted may go
-    without a pose.
+    Without scans an imu is the reference of how the robot turned, or else the odometry of what was asked for. A run of
+    which motions are to be predicted may go without a pose.
 
     Raise Error for a run that was driven and has neither a pose nor odometry to find one from.
     """
     if all(run.pose is not None or run.queries is not None for run in recording.runs):
         return recording
+    if turning_only(recording):
+        return with_turning(recording)
     runs = tuple(
         _with_pose(recording, run, seed, progress) if run.pose is None and run.queries is None and driven(run) else run
         for run in recording.runs

@@ -24,9 +24,9 @@ from kurumaisu.critic.sanity import early_stamps
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
-from kurumaisu.critic.values.selection import beside_odometry
+from kurumaisu.critic.values.selection import beside_odometry, of_turning
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import Gain, RobotTaken
+from kurumaisu.critic.values.verdict import Gain, Multipliers, RobotTaken
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 
@@ -41,6 +41,8 @@ def criticise_drives(
     progress("estimating the noise")
     if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
         ids = beside_odometry(ids)
+    if recording.turning:
+        ids = of_turning(ids)
     rough, first = _begun(recording, model, drives, ids)
     by = early_stamps.lead(first, progress)
     if by > early_stamps.tolerated_lead([run for run in recording.runs if run.name in drives]):
@@ -52,7 +54,8 @@ def criticise_drives(
     train = list(first.drives)
     test = [drive for name in recording.test for drive in drives.get(name, [])]
     made = decide(first, recording.truth, progress)
-    going = unresolved.certain_intermittent(made, [*train, *test])
+    # Where only turning was measured, places say what was asked for, in which nothing comes and goes.
+    going = None if recording.turning else unresolved.certain_intermittent(made, [*train, *test])
     if going is not None:
         progress("judging what is left without the moments in which something comes and goes")
         train, test = [going.freed(drive) for drive in train], [going.freed(drive) for drive in test]
@@ -74,9 +77,13 @@ def criticise_drives(
     best = made.found.best.settings
     shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
     judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
-    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=multipliers.measured(made.problem, made.found.best))
+    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=_multipliers(recording, made))
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
+
+
+def _multipliers(recording: Recording, made: Decision) -> Multipliers | None:
+    return multipliers.measured(made.problem, made.found.best, turning=recording.turning)
 
 
 def _held_out(

@@ -50,13 +50,14 @@ class _Controller:
         return np.stack([(sides[1] + sides[0]) / 2, (sides[1] - sides[0]) / self.track], axis=1)
 
 
-def measured(problem: Problem, best: Fit) -> Multipliers | None:
+def measured(problem: Problem, best: Fit, *, turning: bool = False) -> Multipliers | None:
     """Return the multipliers that the drives of a problem ask for; best: what was found in them.
 
+    turning: only how the robot turned was measured: both radii are right on the mean, as far as anybody knows.
     None for a robot of which no track is known, or where the drives cannot show one of them.
     """
     model, track = problem.model, problem.model.robot.track
-    wheels = {each.id for each in effects.BASE if each.of_wheels}
+    wheels = {each.id for each in effects.BASE if each.of_wheels and not (turning and each.shows_in is effects.Rate.V)}
     own = [each for each in problem.candidates if each.id in wheels]
     if track is None or {each.id for each in own} != wheels:
         return None
@@ -70,7 +71,8 @@ def measured(problem: Problem, best: Fit) -> Multipliers | None:
     if values is None:
         return None
     spread = _spread(problem, fit, values, ids)
-    sds = np.sqrt(np.append(np.diag(spread), [spread[1:, 1:].sum() / 4, spread[0, 0] * track**2]))
+    variances = np.append(np.diag(spread), [spread[1:, 1:].sum() / 4, spread[0, 0] * track**2])
+    sds = np.sqrt(np.maximum(variances, 0.0))  # but for rounding
     means = [*values, (values[1] + values[2]) / 2, values[0] * track]
     separation, left, right, radius, apart = (
         Estimate(float(mean), float(mean - NORMAL90 * sd), float(mean + NORMAL90 * sd), unit)

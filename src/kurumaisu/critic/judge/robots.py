@@ -27,14 +27,14 @@ def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
     if taken.assumed and verdict.verdict != "invalid_data" and not all(run.voltage for run in recording.runs):
         details.append(_assumption(robot))
     if found is not None:
-        details.append(_in_words(found, robot))
+        details.append(_in_words(found, robot, turning=recording.turning))
     told = replace(
         story,
         headline=_worded(story.headline, robot),
         details=tuple(details),
         unexplained=tuple(_worded(one, robot) for one in story.unexplained),
         provenance={**story.provenance, "robot": f"{robot.kind}{', assumed' if taken.assumed else ''}"},
-        paste=_paste(found) if found is not None else "",
+        paste=_paste(found, turning=recording.turning) if found is not None else "",
     )
     return replace(criticism, verdict=replace(verdict, robot=taken), story=told)
 
@@ -49,7 +49,7 @@ def _assumption(robot: Robot) -> str:
     return f"The robot was taken for {what}; `robot:` in meta.yaml, or --robot, says which it is."
 
 
-def _in_words(found: Multipliers, robot: Robot) -> str:
+def _in_words(found: Multipliers, robot: Robot, *, turning: bool) -> str:
     e = found.apparent_track
     track = f"as if its wheels were {with_interval(e.estimate, e.lo90, e.hi90, e.unit)} apart"
     before, after = quantities([found.square_before, found.square_after], "m")
@@ -58,21 +58,26 @@ def _in_words(found: Multipliers, robot: Robot) -> str:
         square += f"; with the multipliers for its controller, {after}, their uncertainty included"
     else:
         square += "; these drives know of no multipliers that would surely close it better"
-    return f"It {'skids, and ' if robot.skids else ''}turns {track}; its software has {robot.track:g} m. {square}."
+    skids = "skids, and " if robot.skids else ""
+    radius = ", if their radius is right, which turning alone does not tell" if turning else ""
+    return f"It {skids}turns {track}{radius}; its software has {robot.track:g} m. {square}."
 
 
-def _paste(found: Multipliers) -> str:
-    """Return lines for the controller's YAML file; nothing where they would be no better."""
+def _paste(found: Multipliers, *, turning: bool) -> str:
+    """Return lines for the controller's YAML file; nothing where they would be no better.
+
+    turning: nobody knows what the radii of both wheels are on the mean.
+    """
     if found.square_after >= found.square_before:
         return ""
     rows = [("wheel_separation_multiplier", found.wheel_separation_multiplier)]
     left, right = found.left_wheel_radius_multiplier, found.right_wheel_radius_multiplier
     if abs(left.estimate - right.estimate) < _UNITY:
-        rows.append(("wheel_radius_multiplier", found.wheel_radius_multiplier))
+        rows += [] if turning else [("wheel_radius_multiplier", found.wheel_radius_multiplier)]
     else:
         rows += [("left_wheel_radius_multiplier", left), ("right_wheel_radius_multiplier", right)]
     lines = [f"{name}: {e.estimate:.4f}  # 90 %: {e.lo90:.4f} to {e.hi90:.4f}" for name, e in rows]
-    if len(rows) > 2:
+    if len(rows) > 2 and not turning:
         e = found.wheel_radius_multiplier
         lines.append(f"# wheel_radius_multiplier: {e.estimate:.4f}  # instead of left and right, which it overrides")
     return "\n".join(lines)

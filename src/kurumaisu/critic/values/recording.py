@@ -46,6 +46,8 @@ class Run:
 
     command: v, w (held); voltage: v_f, v_s (held) and, where known, v, w that they stand for;
     pose: x, y, theta in the map frame, theta unwrapped; odom: x, y, theta, v, w, theta unwrapped;
+    imu: w, the robot's yaw rate by a gyro, without its bias; before that is known, wx, wy, wz about the sensor's axes,
+    and ax, ay, az;
     scan: r0, r1, ... at the time of the first beam, nan = no valid reading, inf = no return;
     covariates: one Series of one column per name, finite values;
     queries: (q, 2) of t0, t1 in a test run; source of the pose: 'measured' or how it was estimated;
@@ -63,6 +65,7 @@ class Run:
     pose_source: str = "measured"
     fan: Fan | None = None
     aside: tuple[tuple[float, float], ...] = ()
+    imu: Series | None = None
 
 
 def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict[str, Series]) -> Run:
@@ -74,6 +77,7 @@ def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict
         pose=parts.get("pose"),
         odom=parts.get("odom"),
         scan=parts.get("scan"),
+        imu=parts.get("imu"),
         covariates=covariates,
     )
 
@@ -103,7 +107,8 @@ class Recording:
     train, test: names of runs; test is empty when gain is measured by leaving one run out.
     truth: sd of the reference pose, position [m] and heading [rad]; None = the critic estimates it.
     problems: all that the reader found wrong and mended or dropped, in words;
-    invalid: those of the problems that forbid a verdict on causes; robot: what is said of it, None where nothing is.
+    invalid: those of the problems that forbid a verdict on causes; robot: what is said of it, None where nothing is;
+    turning: whether how the robot turned is all that was measured: the places of its poses say nothing.
     """
 
     name: str
@@ -117,3 +122,4 @@ class Recording:
     problems: tuple[str, ...] = ()
     invalid: tuple[str, ...] = ()
     robot: Robot | None = None
+    turning: bool = False

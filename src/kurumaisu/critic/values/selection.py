@@ -36,7 +36,22 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
 def beside_odometry(ids: frozenset[str] | None) -> frozenset[str]:
     """Return those of these effects, None for all, that may act between what odometry says and how a robot moves."""
     known = {effect.id for effect in effects.BASE if effect.in_odometry}
-    return (ids if ids is not None else frozenset((*(effect.id for effect in effects.ALL), effects.SMOOTH))) - known
+    return _those(ids) - known
+
+
+def of_turning(ids: frozenset[str] | None) -> frozenset[str]:
+    """Return those of these effects, None for all, that show in how a robot turns by itself.
+
+    Others act on how fast it drives by the same parameter, by which they are told from those that do not.
+    """
+    timely = (effects.Stage.TRANSPORT, effects.Stage.REFERENCE)
+    lost = {each.id for each in effects.BASE if each.shows_in is effects.Rate.V and each.stage not in timely}
+    apart = {each.id for each in effects.BASE if each.separable}
+    return _those(ids) - (lost - apart)
+
+
+def _those(ids: frozenset[str] | None) -> frozenset[str]:
+    return ids if ids is not None else frozenset((*(effect.id for effect in effects.ALL), effects.SMOOTH))
 
 
 def matching(option: str, pattern: str, names: Sequence[str], what: str, listed: str = "") -> list[str]:

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: BSD-3-Clause
+"""A reference where only an inertial sensor measured: how a robot turned is known, how far it went is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kurumaisu.critic.base.drive import driven
+from kurumaisu.critic.data.odometry import along, rates_between
+from kurumaisu.critic.imu.yaw_rate import heading
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.types import FloatArray
+
+# Errors of such a reference: its places say nothing [m], its headings err by less than stamps are off [rad].
+_NOWHERE, _HEADING_SD = 1.0e3, 1.0e-3
+_APART = 0.02  # [s] between rows, at least
+_GAP = 0.5  # [s] without a row in which a turn is not known
+_SOURCE = "headings by the imu, along the way of {}, which nothing checks (no pose was measured)"
+
+
+def turning_only(recording: Recording) -> bool:
+    """Tell whether turning is all that was measured: no run has poses or scans, and each that was driven has an imu."""
+    runs = [run for run in recording.runs if run.queries is None]
+    bare = all(run.pose is None and run.scan is None for run in recording.runs)
+    return bare and bool(runs) and all(run.imu is not None and driven(run) for run in runs)
+
+
+def with_turning(recording: Recording) -> Recording:
+    """Return a recording with headings by the imu for its reference, of which the places say nothing."""
+    runs = tuple(run if run.queries is not None else _turned(run) for run in recording.runs)
+    return replace(recording, runs=runs, truth=(_NOWHERE, _HEADING_SD), turning=True)
+
+
+def _turned(run: Run) -> Run:
+    assert run.imu is not None
+    name, since, gone = _way(run)
+    keep = np.unique(np.searchsorted(run.imu.t, np.arange(run.imu.t[0], run.imu.t[-1], _APART)))
+    t = run.imu.t[keep]
+    theta, way = heading(run.imu)[keep], np.interp(t, since, gone)
+    rows = along(np.column_stack([np.diff(way), np.diff(theta)]))
+    unknown = np.flatnonzero(np.diff(run.imu.t) > _GAP)
+    lost = tuple((float(run.imu.t[i]), float(run.imu.t[i + 1])) for i in unknown)
+    pose = Series(t, rows, ("x", "y", "theta"))
+    return replace(run, pose=pose, pose_source=_SOURCE.format(name), aside=(*run.aside, *lost))
+
+
+def _way(run: Run) -> tuple[str, FloatArray, FloatArray]:
+    """Return by what it is known, times (n,) [s], and how far the robot had gone by then, (n,) [m]."""
+    if run.odom is not None:
+        arcs = rates_between(run.odom.t, run.odom.values[:, :3])[1:, 0] * np.diff(run.odom.t)
+        return "the odometry", run.odom.t, np.append(0.0, np.cumsum(arcs))
+    if run.command is not None:
+        steps = run.command.column("v")[:-1] * np.diff(run.command.t)
+        return "the commands", run.command.t, np.append(0.0, np.cumsum(steps))
+    return "nothing", np.zeros(1), np.zeros(1)
