@@ -42,7 +42,7 @@ def completed(run: Run, hold: float | None, faults: Faults, axis: str | None = N
         f"{run.name}: the reference has no headings: they are the directions of ways of {way:.2g} m, and follow "
         f"{between} in between; what was measured is taken to be above the middle of the axle"
     )
-    return replace(run, pose=pose)
+    return replace(run, pose=pose, courses=True)
 
 
 def _ended(command: Series, hold: float) -> Series:
@@ -61,7 +61,7 @@ def _guide(run: Run) -> Guide | None:
         return plain
     t = run.imu.t
     ahead = plain.v[np.clip(np.searchsorted(plain.t, t, side="right") - 1, 0, None)]
-    return Guide("the imu", t, heading(run.imu), ahead)
+    return Guide("the imu", t, heading(run.imu), ahead, steady=True)
 
 
 def _guide_without_imu(run: Run) -> Guide | None:

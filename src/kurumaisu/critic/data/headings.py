@@ -16,17 +16,22 @@ from kurumaisu.types import FloatArray
 _SHORTEST = 0.05  # [m] least way whose direction is looked at, and
 _NOISES = 40.0  # times the noise of a position: a heading is known to 2 degrees then
 _LONGEST = 10.0  # [s] that a way may take
+_STEADY = 5.0  # [s] over which directions of ways are averaged beside a guide that is steady
 _LARGEST_TURN = 1.0  # [rad] within a way: the chord of an arc of even curvature points as its middle does
 
 
 @dataclass(frozen=True)
 class Guide:
-    """How a robot turned and which way it drove, roughly: times (n,) [s], headings (n,) [rad] from 0, v (n,) [m/s]."""
+    """How a robot turned and which way it drove, roughly: times (n,) [s], headings (n,) [rad] from 0, v (n,) [m/s].
+
+    steady: it is a gyro, off by a bias and a share of its turns, and by little else within seconds.
+    """
 
     name: str
     t: FloatArray
     theta: FloatArray
     v: FloatArray
+    steady: bool = False
 
 
 def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float]:
@@ -49,8 +54,32 @@ def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float
     times, offsets = np.array(found).T
     offsets = np.unwrap(offsets)
     offsets -= offsets[0] - wrap(offsets[0])
-    values = np.column_stack([places, theta + np.interp(t, times, offsets)])
+    if guide is not None and guide.steady:
+        turned = theta + _trend(times, offsets, theta[np.searchsorted(t, times)], t, theta)
+    else:
+        turned = theta + np.interp(t, times, offsets)
+    values = np.column_stack([places, turned])
     return Series(t, values, ("x", "y", "theta")), way
+
+
+def _trend(times: FloatArray, offsets: FloatArray, at: FloatArray, t: FloatArray, theta: FloatArray) -> FloatArray:
+    """Return by how much a steady guide is off at times t (n,), when it says theta, by offsets (k,) where it says at.
+
+    What a bias and a share of its turns leave is averaged over some seconds.
+    """
+    scale = max(float(np.ptp(theta)), 1.0)
+
+    def columns(when: FloatArray, said: FloatArray) -> FloatArray:
+        return np.column_stack([np.ones(len(when)), (when - t[0]) / max(t[-1] - t[0], 1.0), said / scale])
+
+    found, *_ = np.linalg.lstsq(columns(times, at), offsets, rcond=None)
+    left = offsets - columns(times, at) @ found
+    smooth = np.empty(len(times))
+    first, end = (np.searchsorted(times, times + side * 3 * _STEADY) for side in (-1, 1))
+    for i, near in enumerate(map(slice, first, end)):
+        weight = np.exp(-0.5 * ((times[near] - times[i]) / _STEADY) ** 2)
+        smooth[i] = weight @ left[near] / weight.sum()
+    return np.asarray(columns(t, theta) @ found + np.interp(t, times, smooth))
 
 
 def _before(times: FloatArray, at: FloatArray) -> FloatArray:

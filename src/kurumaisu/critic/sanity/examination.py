@@ -13,6 +13,7 @@ from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.ranges.scans.beams import laser_of, time_zero
 from kurumaisu.critic.sanity import (
     headings,
+    imu_match,
     input_match,
     map_agreement,
     pose_jumps,
@@ -123,6 +124,7 @@ def _of_run(run: Run, model: Model) -> list[str]:
     words = _one(headings.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
     words += [*pose_jumps.problems(run.pose, run.command), *_one(rows.blocks(run.pose, "pose"))]
     words += _one(headings.folded(run.pose))
+    words += [] if found is not None and not found.right else imu_match.problems(run)
     # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
     measured = run.pose_source == "measured"
     words += _one(pose_stamps.problem(run.pose)) if measured else []

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu.critic.sanity import imu_match
 from kurumaisu.critic.sanity.contacts import TOPIC, contacts
 from kurumaisu.critic.sanity.pose_jumps import jumps
 from kurumaisu.critic.values.digits import moment, quantities
@@ -29,9 +30,10 @@ def set_aside(recording: Recording, model: Model) -> Recording:
     for run in recording.runs:
         kept, words = _masked(run)
         held = contacts(kept, model)
+        turned, odd = imu_match.odd(kept)
         others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
-        runs.append(replace(kept, aside=(*kept.aside, *held), covariates=others))
-        notes += [*words, *([_held(kept, held)] if held else [])]
+        runs.append(replace(kept, aside=(*kept.aside, *held, *turned), covariates=others))
+        notes += [*words, *([_held(kept, held)] if held else []), *([odd] if odd else [])]
     return replace(recording, runs=tuple(runs), problems=(*recording.problems, *notes))
 
 

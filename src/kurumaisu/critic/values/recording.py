@@ -51,6 +51,7 @@ class Run:
     scan: r0, r1, ... at the time of the first beam, nan = no valid reading, inf = no return;
     covariates: one Series of one column per name, finite values;
     queries: (q, 2) of t0, t1 in a test run; source of the pose: 'measured' or how it was estimated;
+    courses: whether the headings of the pose are directions of its way;
     aside: spans of time [s] that tell nothing of how the chair drives: it was held, or its wheels began to count anew.
     """
 
@@ -66,6 +67,7 @@ class Run:
     fan: Fan | None = None
     aside: tuple[tuple[float, float], ...] = ()
     imu: Series | None = None
+    courses: bool = False
 
 
 def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict[str, Series]) -> Run:
