@@ -5,15 +5,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from kurumaisu import effects
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.params import EffectSetting
 
 _TURNS = "dtheta"  # the channel of a gain that was measured
 _LENGTHS = ("m", "m/s")
-LIMITS = (
-    "Only how the robot turned was measured, by the imu, whose own scale may be off by some per cent: this recording "
-    "cannot tell how far it drives or slips, and effects on its speed were not looked for; a reference of its pose "
-    "tells them."
+_UNSEEN = ("sd_v",)  # parameters of noise that was not measured
+_SCALE = 0.03  # share by which the scale of a gyro may be off
+SCALE_SD = _SCALE / 2
+_LIMITS = (
+    f"Only how the robot turned was measured, by the imu, whose own scale may be off by {100 * _SCALE:.0f} %. This "
+    "recording cannot tell how far it drives or slips, and effects on its speed were not looked for: a reference of "
+    "its pose tells them."
 )
 
 
@@ -28,8 +33,21 @@ def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
         verdict = replace(verdict, gain=replace(gain, rmse={}, channels=channels))
     story = replace(
         story,
-        details=(LIMITS, *story.details),
+        details=(_LIMITS, *story.details),
         noise=tuple(each for each in story.noise if each.unit not in _LENGTHS),
         overlays=(),
     )
-    return replace(criticism, verdict=verdict, story=story)
+    settings = tuple(_seen(setting) for setting in criticism.settings)
+    return replace(criticism, verdict=verdict, story=story, settings=settings)
+
+
+def imu_explains(name: str, share: float) -> bool:
+    """Tell whether an effect, by its id, turns the robot by such a share as the scale of a gyro may be off by."""
+    effect = effects.by_id(name)
+    follows = effect in effects.BASE and effect.follows is effects.Follows.W and effect.shows_in is effects.Rate.W
+    return follows and share < _SCALE
+
+
+def _seen(setting: EffectSetting) -> EffectSetting:
+    parameters = {name: 0.0 if name in _UNSEEN else value for name, value in setting.parameters.items()}
+    return replace(setting, parameters=parameters)

@@ -22,6 +22,7 @@ from kurumaisu.critic.heldout.materiality import (
     share_of_way,
     simulates_nearer,
 )
+from kurumaisu.critic.imu.turning_only import imu_explains
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
@@ -78,7 +79,7 @@ def criticism(
 ) -> Criticism:
     """Return the criticism after a search; gain: the gain on held-out drives, None when nothing was found."""
     problem = made.problem
-    held, shares, matters = _materiality(made, gain)
+    held, shares, matters = _materiality(made, gain, turning=recording.turning)
     found = replace(made.found, confounded=_told_sets(made.found, matters))
     fitted = {name: intervals.estimates(problem, found.best, name) for name in sorted(found.best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
@@ -111,8 +112,11 @@ def criticism(
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem)))
 
 
-def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, float], set[str]]:
-    """Return whether held-out drives confirm what was found, how far each effect moves the chair, and which matter."""
+def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[bool, dict[str, float], set[str]]:
+    """Return whether held-out drives confirm what was found, how far each effect moves the chair, and which matter.
+
+    turning: only that was measured, by an imu, of which the scale is not known.
+    """
     problem, best = made.problem, made.found.best
     nats = made.found.nats(best)
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
@@ -121,6 +125,9 @@ def _materiality(made: Decision, gain: Gain | None) -> tuple[bool, dict[str, flo
     others = {name: without(best.settings, name) for name in sorted(best.ids)}
     shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
     felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
+    for name in shares if turning else ():
+        if imu_explains(name, shares[name]):
+            shares[name] = felt[name] = 0.0
     return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
 
 

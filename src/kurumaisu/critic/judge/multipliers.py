@@ -22,6 +22,7 @@ from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.experiment import design
+from kurumaisu.critic.imu.turning_only import SCALE_SD
 from kurumaisu.critic.values.verdict import NORMAL90, Estimate, Multipliers
 from kurumaisu.experiments import Phase, samples
 from kurumaisu.params import EffectSetting, Model
@@ -53,7 +54,8 @@ class _Controller:
 def measured(problem: Problem, best: Fit, *, turning: bool = False) -> Multipliers | None:
     """Return the multipliers that the drives of a problem ask for; best: what was found in them.
 
-    turning: only how the robot turned was measured: both radii are right on the mean, as far as anybody knows.
+    turning: only how the robot turned was measured: both radii are right on the mean, as far as anybody knows,
+    and the scale of the imu is not known quite.
     None for a robot of which no track is known, or where the drives cannot show one of them.
     """
     model, track = problem.model, problem.model.robot.track
@@ -71,6 +73,7 @@ def measured(problem: Problem, best: Fit, *, turning: bool = False) -> Multiplie
     if values is None:
         return None
     spread = _spread(problem, fit, values, ids)
+    spread[0, 0] += (SCALE_SD * values[0]) ** 2 if turning else 0.0
     variances = np.append(np.diag(spread), [spread[1:, 1:].sum() / 4, spread[0, 0] * track**2])
     sds = np.sqrt(np.maximum(variances, 0.0))  # but for rounding
     means = [*values, (values[1] + values[2]) / 2, values[0] * track]

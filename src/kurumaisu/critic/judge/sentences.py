@@ -23,6 +23,7 @@ _CAUSES_TOLD = 4  # in a headline
 _KINDS_TOLD = 2  # of problems in a headline
 _RIVALS_SHOWN = 4  # of those with other causes, and of those with more or fewer
 
+_NO_MORE = "no more than the scale of the imu may be off by"
 UNTESTED = "The held-out drives hardly show this effect, so they neither confirm nor refute it."
 
 
@@ -97,7 +98,8 @@ def details(
         moved = (
             f"after {HORIZON:g} s the chair is off by {100 * shares[name]:.1f} % of the distance driven or angle turned"
         )
-        said.append(f"{name}: {', '.join(told)}; {moved}{_weight(name, found, shares, matters)}{_form(name, found)}.")
+        weighed = f"{moved}{_weight(name, found, shares, matters)}{_form(name, found)}"
+        said.append(f"{name}: {', '.join(told)}; {weighed if shares[name] else _NO_MORE}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"Noise of the yaw rate turns the heading by about {wander:.0f}° in a minute; no model can predict it.")

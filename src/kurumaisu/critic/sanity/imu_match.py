@@ -23,7 +23,6 @@ _GAP = 0.5  # [s] without rows of the gyro
 _FEWEST = 20  # intervals
 _TURNING = 0.05  # [rad/s] rms of turning below which neither scale nor clock shows
 _LAGS = np.arange(-10.0, 10.01, 0.05)  # [s] by which a reference may come after the gyro
-_TRIMMED = 0.9  # share of the intervals that a clock is judged by: others may hold jumps
 _LATE = 0.5  # [s] more is no delay of a reference
 _SCALE = 0.05  # share by which a gyro's scale may be off, and more
 _FAR, _TURN = 8.0, 0.1  # sd, and [rad], from which an interval is odd
@@ -114,8 +113,8 @@ def _compared(pose: Series, imu: Series) -> Comparison | None:
         use, turned, seen, dt = _intervals(t, theta, imu.t, whole, gaps, late)
         if use.sum() < _FEWEST or np.sqrt(np.mean((turned[use] / dt[use]) ** 2)) < _TURNING:
             continue
-        left = _line(turned[use], seen[use], dt[use])[0] ** 2
-        cost = float(np.sort(left)[: int(_TRIMMED * len(left))].mean())
+        # Moduli, not squares: some intervals may hold jumps.
+        cost = float(np.abs(_line(turned[use], seen[use], dt[use])[0]).mean())
         best = min(best, (cost, float(late))) if best is not None else (cost, float(late))
     if best is None:
         return None
