@@ -40,6 +40,17 @@ def test_the_warthogs_wheels_and_track():
     assert kept[1] < 0.1
 
 
+def test_the_warthogs_gyro_tells_how_far_it_turns_as_its_lidar_does(tmp_path):
+    needs(DATA / "norlab_drive")
+    log = warthog.load(DATA)
+    radius, track, _ = warthog.wheels_against_ground(log, 134.0, 218.0)
+    by_lidar = radius / track / (warthog.RADIUS / warthog.TRACK)
+    folder = warthog.recording_of_gyro(log, log.imu, tmp_path / "gyro")
+    found = criticise(Job(folder, tmp_path / "out", ids=frozenset({"base.gain_w", "base.veer"})), lambda _: None)
+    gain = next(cause for cause in found.verdict.causes if cause.id == "base.gain_w").parameters["gain"].estimate
+    assert 1 + gain == pytest.approx(by_lidar, abs=0.02)
+
+
 def test_wheels_are_measured_though_poses_come_rarely_on_a_winding_way():
     """S-bends within gaps of up to 9 s, as the Warthog's poses have: the chords alone are 2 % short."""
     t = np.arange(0.0, 90.0, 0.05)

@@ -19,6 +19,7 @@ RADIUS = 0.30  # [m] of the wheels, nominal; what it really is, is asked
 TRACK = 1.50  # [m] between the wheels, nominal
 _COUNTS = "calib"  # state in which commands mean something
 _GAP, _DRAINED = 0.16, 1.0  # [s] between poses that come as they are measured; after a longer one, until none waits
+_IMU = (*"xyz", *(f"acceleration_{axis}" for axis in "xyz"))
 _WINDOW = 2.0  # [s] over which wheels and ground are compared by hand
 _ROUNDS = 5  # of working out how much of a way its chords cut, by the wheels that come of it
 
@@ -27,7 +28,7 @@ _ROUNDS = 5  # of working out how much of a way its chords cut, by the wheels th
 class Log:
     """The log: t (n,) [s]; commands v, w (n,); wheels (n, 2) left and right [rad/s]; poses (m, 4) by time.
 
-    all_poses: with those that came late.
+    all_poses: with those that came late; imu (k, 7): by time, rates [rad/s] and accelerations [m/s^2].
     """
 
     t: FloatArray
@@ -37,6 +38,7 @@ class Log:
     counts: FloatArray
     pose: FloatArray
     all_poses: FloatArray
+    imu: FloatArray | None = None
 
 
 def load(data: Path) -> Log:
@@ -61,6 +63,7 @@ def load(data: Path) -> Log:
         counts=np.array([row["calib_state"] == _COUNTS for row in rows]),
         pose=poses[~late(poses[:, 0])],
         all_poses=poses,
+        imu=np.column_stack([t, *(column(f"imu_{name}") for name in _IMU)])[1:],  # the first row has none yet
     )
 
 
@@ -162,14 +165,26 @@ def run(data: Path, output: Path) -> None:
     print(f"driven by a person, 134-218 s: {wheels_against_ground(log, 134.0, 218.0)[2]}")
     print(f"driven by commands, 405-430 s: {wheels_against_ground(log, 405.0, 430.0)[2]}")
     criticise(_wheels(log, output / "wheels"), output / "wheels", "wheels against the ground")
+    assert log.imu is not None
+    turned = recording_of_gyro(log, log.imu, output / "gyro")
+    criticise(turned, output / "gyro", "wheels against the gyro, without any pose")
 
 
 def _wheels(log: Log, folder: Path) -> Path:
     """Write nominal odometry and lidar poses of both times that the robot moved for long."""
+    return _beside_odometry(log, folder, "pose", log.pose)
+
+
+def recording_of_gyro(log: Log, imu: FloatArray, folder: Path) -> Path:
+    """Write nominal odometry and the imu of both times that the robot moved for long; return where."""
+    return _beside_odometry(log, folder, "imu", imu)
+
+
+def _beside_odometry(log: Log, folder: Path, name: str, rows: FloatArray) -> Path:
     nominal = odometry(log, RADIUS, TRACK)
     spans = {"manual": (134.0, 218.0), "commanded": (405.0, 431.0)}
     return recording(
         folder,
-        {name: {"odom": between(nominal, *span), "pose": between(log.pose, *span)} for name, span in spans.items()},
+        {drive: {"odom": between(nominal, *span), name: between(rows, *span)} for drive, span in spans.items()},
         robot={"kind": "skid_steer", "radius": RADIUS, "track": TRACK},
     )

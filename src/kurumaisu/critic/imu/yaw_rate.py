@@ -17,6 +17,7 @@ RATES, ACCELERATIONS = ("wx", "wy", "wz"), ("ax", "ay", "az")
 UNUSED = "none"  # the axis of a sensor that is not to be used
 _FEWEST = 20  # rows
 _TOGETHER = 5.0  # [s] with what says how the robot turned
+_NOTHING = 1e-9  # [rad/s] of rounding
 _SHORTEST = 1.0  # [s] of rest of which the bias is taken
 
 
@@ -63,7 +64,8 @@ def _yaw_rate(run: Run, imu: Series, axis: str | None) -> tuple[Series, str]:
     rates = means(imu.t, rows, at)
     mounting = found(rates, others, None if ours else _gravity(imu, at, rest), _given(axis, ours=ours))
     w, bias = _without_bias(rates @ mounting.up, rest & np.isfinite(rates).all(axis=1), others[0].w, mounting)
-    words = f"the imu's {mounting.name} is up ({mounting.why}); {bias}"
+    words = f"{mounting.name} is up ({mounting.why})" if not ours else f"w is the robot's yaw rate, {mounting.why}"
+    words = f"the imu's {words}; {bias}"
     return Series(imu.t, (rows @ mounting.up - w)[:, None], RATE), words
 
 
@@ -102,4 +104,5 @@ def _without_bias(w: FloatArray, rest: BoolArray, turning: FloatArray, mounting:
 
 
 def _told(bias: float) -> str:
+    bias = 0.0 if abs(bias) < _NOTHING else bias
     return f"{bias:+.2g} rad/s ({np.degrees(bias):+.2g} deg/s)"

@@ -51,7 +51,8 @@ def criticise_drives(
     if by > early_stamps.tolerated_lead([run for run in recording.runs if run.name in drives]) and not sensors:
         return explain.invalid(recording, model, [early_stamps.problem(by)]), NOTHING
     if by > 0:
-        recording = replace(recording, problems=(*recording.problems, early_stamps.note(by)))
+        note = early_stamps.beside_imu(by) if sensors else early_stamps.note(by)
+        recording = replace(recording, problems=(*recording.problems, note))
         drives = {name: [early_stamps.restamped(drive, by) for drive in some] for name, some in drives.items()}
         rough, first = _begun(recording, model, drives, ids)
     train = list(first.drives)

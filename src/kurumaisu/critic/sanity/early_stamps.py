@@ -70,6 +70,11 @@ def note(by: float) -> str:
     return f"all runs: the motion comes {by:.3f} s before its command: judged with the pose's stamps {by:+.3f} s"
 
 
+def beside_imu(by: float) -> str:
+    """Return what was mended where odometry is compared with an imu, in words."""
+    return f"all runs: the odometry comes {by:.3f} s after the imu: judged with the imu's stamps {by:+.3f} s"
+
+
 def _later(problem: Problem, by: float) -> Problem:
     return problem.changed(drives=[restamped(drive, by) for drive in problem.drives])
 
