@@ -54,4 +54,4 @@ def _way(run: Run) -> tuple[str, FloatArray, FloatArray]:
     if run.command is not None:
         steps = run.command.column("v")[:-1] * np.diff(run.command.t)
         return "the commands", run.command.t, np.append(0.0, np.cumsum(steps))
-    return "nothing", np.zeros(1), np.zeros(1)
+    return "no odometry", np.zeros(1), np.zeros(1)

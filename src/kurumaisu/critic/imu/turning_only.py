@@ -15,6 +15,7 @@ _LENGTHS = ("m", "m/s")
 _UNSEEN = ("sd_v",)  # parameters of noise that was not measured
 _SCALE = 0.03  # share by which the scale of a gyro may be off
 SCALE_SD = _SCALE / 2
+EXPLAINED = -1.0  # no share
 _LIMITS = (
     f"Only how the robot turned was measured, by the imu, whose own scale may be off by {100 * _SCALE:.0f} %. This "
     "recording cannot tell how far it drives or slips, and effects on its speed were not looked for: a reference of "
@@ -41,11 +42,14 @@ def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
     return replace(criticism, verdict=verdict, story=story, settings=settings)
 
 
-def imu_explains(name: str, share: float) -> bool:
-    """Tell whether an effect, by its id, turns the robot by such a share as the scale of a gyro may be off by."""
+def beyond_imu(shares: dict[str, float]) -> dict[str, float]:
+    """Return by which share each effect turns the robot, by its id; EXPLAINED where that may be the scale of a gyro."""
+    return {name: EXPLAINED if _like_scale(name) and share < _SCALE else share for name, share in shares.items()}
+
+
+def _like_scale(name: str) -> bool:
     effect = effects.by_id(name)
-    follows = effect in effects.BASE and effect.follows is effects.Follows.W and effect.shows_in is effects.Rate.W
-    return follows and share < _SCALE
+    return effect in effects.BASE and effect.follows is effects.Follows.W and effect.shows_in is effects.Rate.W
 
 
 def _seen(setting: EffectSetting) -> EffectSetting:

@@ -14,7 +14,7 @@ from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
 from kurumaisu.critic.heldout.materiality import share_of_way
-from kurumaisu.critic.imu.turning_only import imu_explains
+from kurumaisu.critic.imu.turning_only import beyond_imu
 from kurumaisu.critic.judge import excitation, explain, explain_unknown, multipliers, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
@@ -80,8 +80,7 @@ def criticise_drives(
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
     best = made.found.best.settings
     shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
-    if recording.turning:
-        shares = {name: 0.0 if imu_explains(name, share) else share for name, share in shares.items()}
+    shares = beyond_imu(shares) if recording.turning else shares
     judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=_multipliers(recording, made))
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))

@@ -22,7 +22,7 @@ from kurumaisu.critic.heldout.materiality import (
     share_of_way,
     simulates_nearer,
 )
-from kurumaisu.critic.imu.turning_only import imu_explains
+from kurumaisu.critic.imu.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.extended_model import process_noise
@@ -125,9 +125,9 @@ def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[b
     others = {name: without(best.settings, name) for name in sorted(best.ids)}
     shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
     felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
-    for name in shares if turning else ():
-        if imu_explains(name, shares[name]):
-            shares[name] = felt[name] = 0.0
+    if turning:
+        shares = beyond_imu(shares)
+        felt = {name: 0.0 if shares[name] == EXPLAINED else size for name, size in felt.items()}
     return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
 
 

@@ -11,6 +11,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
+from kurumaisu.critic.imu.turning_only import EXPLAINED
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.policy import NAMED, RIVAL
@@ -99,7 +100,7 @@ def details(
             f"after {HORIZON:g} s the chair is off by {100 * shares[name]:.1f} % of the distance driven or angle turned"
         )
         weighed = f"{moved}{_weight(name, found, shares, matters)}{_form(name, found)}"
-        said.append(f"{name}: {', '.join(told)}; {weighed if shares[name] else _NO_MORE}.")
+        said.append(f"{name}: {', '.join(told)}; {_NO_MORE if shares[name] == EXPLAINED else weighed}.")
     n = problem.noise
     wander = np.degrees(np.sqrt(2 * _MINUTE * (n.sd_w**2 * n.tau + n.slow_w**2 * n.slow_tau)))
     said.append(f"Noise of the yaw rate turns the heading by about {wander:.0f}° in a minute; no model can predict it.")
