@@ -26,7 +26,7 @@ _LAGS = np.arange(-10.0, 10.01, 0.05)  # [s] by which a reference may come after
 _LATE = 0.5  # [s] more is no delay of a reference
 _SCALE = 0.05  # share by which a gyro's scale may be off, and more
 _FAR, _TURN = 8.0, 0.1  # sd, and [rad], from which an interval is odd
-_MOST = 0.05  # share of the intervals that may be set aside
+_MOST = 0.1  # share of the intervals that may be set aside
 _AGREES = 0.03  # share by which two that agree may differ
 
 
