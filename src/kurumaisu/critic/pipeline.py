@@ -11,7 +11,6 @@ from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.heldout.extension_gain import with_gains
-from kurumaisu.critic.imu.turning_only import with_limits
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
@@ -72,7 +71,7 @@ def criticise(
     scans, settings = from_base_link(found.verdict.causes, scans, recording, model, again)
     found = with_scans(found, scans)
     found = with_gains(found, whole, replace(extension, scans=settings), progress, slam=slam)
-    found = with_limits(with_robot(found, recording), recording)
+    found = with_robot(found, recording)
     if not predictions.asked(recording):
         return found
     progress("predicting what the queries ask for")

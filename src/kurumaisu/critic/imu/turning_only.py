@@ -25,9 +25,9 @@ _LIMITS = (
 
 def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
     """Return a criticism without figures of what was not measured, and with what such a recording cannot tell."""
-    if not recording.turning:
-        return criticism
     verdict, story = criticism.verdict, criticism.story
+    if not recording.turning or verdict.verdict == "invalid_data":
+        return criticism
     gain = verdict.gain
     if gain is not None:
         channels = {name: each for name, each in gain.channels.items() if name == _TURNS}

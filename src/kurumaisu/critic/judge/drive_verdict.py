@@ -40,10 +40,7 @@ def criticise_drives(
     """Return what the drives of a recording say against a model, and what extends it by that."""
     drives = _drives(recording, model)
     progress("estimating the noise")
-    if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
-        ids = beside_odometry(ids)
-    if recording.turning:
-        ids = of_turning(ids)
+    ids = _looked_for(recording, drives, ids)
     rough, first = _begun(recording, model, drives, ids)
     by = early_stamps.lead(first, progress)
     # Of two sensors neither asks the other for anything, so that one may be late.
@@ -78,13 +75,27 @@ def criticise_drives(
     proposal = propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
-    best = made.found.best.settings
-    shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
-    shares = beyond_imu(shares) if recording.turning else shares
+    shares = _shares(recording, made)
     judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=_multipliers(recording, made))
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
+
+
+def _looked_for(
+    recording: Recording, drives: Mapping[str, Sequence[Drive]], ids: frozenset[str] | None
+) -> frozenset[str] | None:
+    """Return those of these effects, None for all, that such drives can tell of."""
+    if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
+        ids = beside_odometry(ids)
+    return of_turning(ids) if recording.turning else ids
+
+
+def _shares(recording: Recording, made: Decision) -> dict[str, float]:
+    """Return by which share each effect that was found moves the robot, by its id."""
+    best = made.found.best.settings
+    shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
+    return beyond_imu(shares) if recording.turning else shares
 
 
 def _multipliers(recording: Recording, made: Decision) -> Multipliers | None:

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 
 from kurumaisu.critic.base.replay import robot_said
+from kurumaisu.critic.imu.turning_only import with_limits
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.recording import Recording
@@ -18,7 +19,10 @@ _UNITY = 1.0e-3  # by which wheels must differ before either side has a multipli
 
 
 def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
-    """Return the criticism with the robot that it is of: what was assumed, what to paste, and what to call it."""
+    """Return the criticism with the robot that it is of: what was assumed, what to paste, and what to call it.
+
+    Of one that was only seen to turn, without what nobody measured.
+    """
     robot = criticism.model.robot
     verdict, story = criticism.verdict, criticism.story
     found = None if verdict.robot is None else verdict.robot.multipliers
@@ -36,7 +40,7 @@ def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
         provenance={**story.provenance, "robot": f"{robot.kind}{', assumed' if taken.assumed else ''}"},
         paste=_paste(found, turning=recording.turning) if found is not None else "",
     )
-    return replace(criticism, verdict=replace(verdict, robot=taken), story=told)
+    return with_limits(replace(criticism, verdict=replace(verdict, robot=taken), story=told), recording)
 
 
 def _worded(sentence: str, robot: Robot) -> str:
