@@ -64,9 +64,10 @@ class StatisticsLikelihood:
         """Return how far numbers are from the model's own, in sds."""
         return np.asarray((numbers - self.offset) / self.sd)
 
-    def moves_places(self, change: FloatArray) -> bool:
-        """Return whether a change of the numbers (m,) moves the places of piles, by more than chance."""
-        return bool((np.abs(change / self.sd)[self._places] >= _FAR).any())
+    def places_off(self, numbers: FloatArray) -> FloatArray:
+        """Return how far the places of piles are off the measured ones, in sds; 0 where a small step leads there."""
+        off = ((numbers - self.measured) / self.sd)[self._places]
+        return np.where(np.abs(off) < _FAR, 0.0, off)
 
     def cost(self, numbers: FloatArray) -> float:
         """Return the negative log likelihood of the measured numbers for simulated ones, 0 for a perfect model."""

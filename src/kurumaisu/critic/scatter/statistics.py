@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
+from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
@@ -71,7 +71,7 @@ class Statistics:
         seen = assembly.marks.seen
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
-        self._trust = assembly.geometry
+        self._trust, self._mapped = assembly.geometry, assembly.mapped
         self._farthest = assembly.shots.laser.range_max
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
@@ -92,8 +92,7 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        said = readings[self._trust]
-        ends = cut_off_ends(said)
+        ends = self._ends(readings)
         left, common = self._leftover(error, ends)
         inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
@@ -107,15 +106,17 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_once(self._edges.mixed(readings), self._layout.stand)))
-        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
+        out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
+        said = readings[self._trust]
+        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._mapped])]
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
 
         readings, error: as of `of`.
         """
-        left, _ = self._leftover(error, cut_off_ends(readings[self._trust]))
+        left, _ = self._leftover(error, self._ends(readings))
         _, _, free, known = self._fluctuating(left)
         return free**2, known
 
@@ -169,6 +170,10 @@ class Statistics:
             Statistic("lower cut-off of the readings", count=False, off=False),
             Statistic("upper cut-off of the readings", count=False, off=False),
         ]
+
+    def _ends(self, readings: FloatArray) -> tuple[float, float]:
+        """Return where readings (k, b) are cut off [m]: those, too, of walls farther than any reading that is trusted."""
+        return cut_off_ends(readings[self._mapped])
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
         """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
@@ -285,13 +290,16 @@ def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
     return _log(_mean(sums[many] ** 2 / chance[many], 1.0))
 
 
-def _values(readings: FloatArray) -> list[float]:
-    """Return how many different values there are, and how many readings have the least and the greatest of them."""
+def _counts(readings: FloatArray) -> IntArray:
+    """Return how many readings have each value, from the least to the greatest."""
     steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
-    if not len(steps):
-        return [0.0, 0.0, 0.0]
-    counts = np.bincount(steps - steps.min())
-    return [_log(np.count_nonzero(counts)), _root(int(counts[0])), _root(int(counts[-1]))]
+    return np.bincount(steps - steps.min()) if len(steps) else np.zeros(1, dtype=np.int64)
+
+
+def _least_and_greatest(readings: FloatArray) -> tuple[float, float]:
+    """Return how many readings have the least and the greatest value, as roots of counts."""
+    counts = _counts(readings)
+    return _root(int(counts[0])), _root(int(counts[-1]))
 
 
 def _spacing(readings: FloatArray) -> float:

@@ -83,9 +83,12 @@ def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def without_cut_off(readings: FloatArray) -> FloatArray:
-    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place."""
-    low, high = cut_off_ends(readings)
+def without_cut_off(readings: FloatArray, ends: tuple[float, float] | None = None) -> FloatArray:
+    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place.
+
+    ends [m]: where they are cut off, None: as they pile up.
+    """
+    low, high = ends or cut_off_ends(readings)
     with np.errstate(invalid="ignore"):
         return np.where((readings > low) & (readings < high), readings, np.nan)
 

@@ -208,7 +208,7 @@ class Assembly:
         out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
         out.motion = None if self.motion is None else [self.motion[row] for row in rows]
         out.residual, out.moved, out.poses = self.residual[rows], self.moved[rows], self.poses[rows]
-        out.geometry = self.geometry[rows]
+        out.geometry, out.mapped = self.geometry[rows], self.mapped[rows]
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out
 
