@@ -71,8 +71,9 @@ class Statistics:
         seen = assembly.marks.seen
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
-        self._trust, self._mapped = assembly.geometry, assembly.mapped
-        self._farthest = assembly.shots.laser.range_max
+        self._trust, self._farthest = assembly.geometry, assembly.shots.laser.range_max
+        # What is not read by the model may be anything where readings are cut off: no return, or the last value.
+        self._read = assembly.mapped & (self._base > assembly.shots.laser.range_min) & (self._base < self._farthest)
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._layout, self._tau = assembly.layout, noise.lasting_tau
@@ -108,7 +109,7 @@ class Statistics:
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
         said = readings[self._trust]
-        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._mapped])]
+        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
         return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -173,7 +174,7 @@ class Statistics:
 
     def _ends(self, readings: FloatArray) -> tuple[float, float]:
         """Return where readings (k, b) are cut off [m]: those, too, of walls farther than any reading that is trusted."""
-        return cut_off_ends(readings[self._mapped])
+        return cut_off_ends(readings[self._read])
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
         """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
