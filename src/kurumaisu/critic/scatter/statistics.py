@@ -19,8 +19,10 @@ from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, f
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_ALONG = ("range", "incidence")  # in whose order readings are grouped, from near to far and from straight to oblique
-_PARTS = 4  # groups of either, and of reflectances at most
+# In whose order readings are grouped, from near to far and from straight to oblique, and at which quantiles: what grows
+# with the footprint does so in few, the most oblique ones.
+_ALONG = {"range": (0.25, 0.5, 0.75), "incidence": (0.5, 0.75, 0.9)}
+_SURFACES = 4  # groups by the reflectance, at most
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
 _WITHIN = 3.0  # sds of errors of poses, within which a reading may be one that is cut off
@@ -135,7 +137,17 @@ class Statistics:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([one.count for one in self._told()])
         places = np.arange(len(counts)) >= len(counts) - _PLACES
-        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds(), self._alike())
+
+    def _alike(self) -> FloatArray:
+        """Return correlations of the numbers (m, m): one reading that is missing is so in all groups it belongs to."""
+        told = self._told()
+        counts = [i for i, one in enumerate(told) if one.count and one.group is not None]
+        masks = np.array([mask.ravel() for mask in self._groups.masks], dtype=np.float64)
+        masks /= np.linalg.norm(masks, axis=1, keepdims=True)
+        out = np.eye(len(told))
+        out[np.ix_(counts, counts)] = masks @ masks.T
+        return out
 
     def _folds(self) -> FloatArray:
         """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
@@ -173,7 +185,7 @@ class Statistics:
         ]
 
     def _ends(self, readings: FloatArray) -> tuple[float, float]:
-        """Return where readings (k, b) are cut off [m]: those, too, of walls farther than any reading that is trusted."""
+        """Return where readings (k, b) are cut off [m], those included that are too far out to be trusted."""
         return cut_off_ends(readings[self._read])
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
@@ -236,11 +248,11 @@ class _Edges:
 
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
     found: list[tuple[str, str, BoolArray]] = []
-    for kind, values in zip(_ALONG, (ranges, incidence), strict=True):
-        cuts = np.quantile(values[expected], np.linspace(0, 1, _PARTS + 1)[1:-1])
-        bins = np.digitize(values, cuts)
-        found += [(kind, f"{kind} {i + 1} of {_PARTS}", expected & (bins == i)) for i in range(_PARTS)]
-    for value in np.unique(returns[expected])[:_PARTS]:
+    for (kind, shares), values in zip(_ALONG.items(), (ranges, incidence), strict=True):
+        bins = np.digitize(values, np.quantile(values[expected], shares))
+        parts = len(shares) + 1
+        found += [(kind, f"{kind} {i + 1} of {parts}", expected & (bins == i)) for i in range(parts)]
+    for value in np.unique(returns[expected])[:_SURFACES]:
         found.append(("reflectance", f"reflectance {value:g}", expected & (returns == value)))
     kinds, names, masks = zip(*(each for each in found if each[2].any()), strict=True)
     logs = [np.log(np.median(ranges[m])) if kind == "range" else np.nan for kind, m in zip(kinds, masks, strict=True)]

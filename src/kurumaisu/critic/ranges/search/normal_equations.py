@@ -191,13 +191,12 @@ class Assembly:
                 self.columns[:, :, form.span] = columns
                 self.forms[self.forms.index(form)] = replace(form, at=at)
 
-    def smooth_rows(self, most: int) -> IntArray:
-        """Return at most so many of the scans, evenly taken from those where the chair's path is smooth.
+    def smooth_rows(self) -> IntArray:
+        """Return the scans where the chair's path is smooth.
 
         Where a rate jumps nobody knows just where the chair was, and readings seem to scatter far.
         """
-        rows = np.flatnonzero(self._on_smooth_path())
-        return np.asarray(rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(int))])
+        return np.flatnonzero(self._on_smooth_path())
 
     def thinned(self, rows: IntArray) -> Assembly:
         """Return some of the scans, without columns."""
