@@ -22,11 +22,11 @@ def anywhere(rng, scan):
 
 
 def in_bursts(rng, scan):
-    """A fifth of the readings of some hundred neighbours, others from scan to scan, are anything up to 4 m."""
+    """A fifth of the readings of some hundred neighbours, others from scan to scan, are anything from 0.1 to 4 m."""
     beams = np.arange(scan.values.shape[1])
     start = rng.integers(0, len(beams), len(scan.t))[:, np.newaxis]
     hit = (np.abs(beams - start) < 50) & (rng.random(scan.values.shape) < 0.2)
-    return np.where(hit, rng.uniform(0, 4, scan.values.shape), scan.values)
+    return np.where(hit, rng.uniform(0.1, 4, scan.values.shape), scan.values)
 
 
 @pytest.mark.parametrize(("spoil", "name"), [(anywhere, "laser.heavy_tails"), (in_bursts, "laser.crosstalk")])
@@ -55,6 +55,21 @@ def test_a_burst_is_not_bent_to_do_what_beams_lose(tmp_path):
     causes = {cause.id: cause.parameters for cause in finding.causes}
     assert set(causes) == {"laser.crosstalk", "laser.dropout"}
     assert causes["laser.dropout"]["probability"].estimate == pytest.approx(0.04, rel=0.3)
+
+
+def test_a_cut_off_just_inside_the_range_is_saturation(tmp_path):
+    """No reading that is trusted comes within 0.1 m of the laser's 4 m, and no usual size is near."""
+    told = recording(tmp_path, None, 0.0, 6, scans=30)
+    runs = tuple(
+        replace(
+            run,
+            scan=replace(run.scan, values=np.where(run.scan.values < 4.0, np.minimum(run.scan.values, 3.96), np.inf)),
+        )
+        for run in told.runs
+    )
+    finding = criticise_scans(replace(told, runs=runs), MODEL, lambda _: None, IDS | {"laser.saturation"})
+    assert [cause.id for cause in finding.causes] == ["laser.saturation"]
+    assert finding.causes[0].parameters["inverse_far"].estimate == pytest.approx(1 / 3.96, rel=0.002)
 
 
 def test_readings_are_expected_from_where_a_scan_puts_its_reference():

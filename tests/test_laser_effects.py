@@ -167,6 +167,38 @@ def test_tails_are_those_of_student():
     assert stats.kstest(errors, "norm").pvalue < ALPHA
 
 
+def test_neighbours_on_one_oblique_wall_are_not_mixed():
+    """Beams 2.9 degrees apart on a wall a metre away: the farthest neighbours are half a metre apart in range."""
+    bearings = np.linspace(-1.3, 1.3, 53)
+    wall = echoes(1 / np.cos(bearings), bearings=bearings, incidence=np.abs(bearings))
+    assert np.abs(np.diff(wall.ranges)).max() > 0.5
+    np.testing.assert_array_equal(
+        read("laser.mixed_pixels", wall, probability=1.0), read("laser.mixed_pixels", wall, probability=0.0)
+    )
+    box = replace(wall, ranges=np.where(np.abs(bearings) < 0.2, 0.5, wall.ranges), incidence=0 * bearings)
+    mixed = read("laser.mixed_pixels", box, probability=1.0) != read("laser.mixed_pixels", box, probability=0.0)
+    assert set(np.flatnonzero(np.abs(np.diff(box.ranges)) > 0.3)) <= set(np.flatnonzero(mixed))
+
+
+@pytest.mark.parametrize("effect", READING, ids=lambda effect: effect.id)
+def test_many_scans_at_once_are_read_as_one_by_one(effect):
+    first = effect.parameters[0]
+    values = {first.name: first.null + first.scale}
+    rng = np.random.default_rng(4)
+    scans = [
+        echoes(rng.uniform(0.5, 3.5, N), 5.0 * i, i, incidence=INCIDENCE, returns=rng.uniform(0.2, 1.0, N))
+        for i in range(6)
+    ]
+    together = {
+        one.name: np.stack([getattr(scan, one.name) for scan in scans])
+        for one in fields(scans[0])
+        if one.name not in ("stamp", "bearings", "origins", "known")
+    }
+    every = replace(scans[0], stamp=np.array([[scan.stamp] for scan in scans]), **together)
+    alone = chain(effect.id, **values)
+    np.testing.assert_array_equal(chain(effect.id, **values).read(every), [alone.read(scan) for scan in scans])
+
+
 def test_mixed_pixels_lie_between_both_sides_of_a_jump():
     ranges = np.tile([1.0] * 5 + [3.0] * 5 + [np.inf] * 2, 1000)
     it = echoes(ranges, sd=np.zeros(len(ranges)), mean=ranges)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Shots, scans_of, with_own
+from kurumaisu.critic.ranges.scans.beams import Shots, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
@@ -28,7 +28,6 @@ from kurumaisu.params import EffectSetting
 # Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
 # have in common beyond the simplest equation for it moves the mean of a scan as well.
 _HEARD = 0.06
-_SCATTERED = 90  # scans whose scatter is looked at: each simulation of them takes a fiftieth of a second
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def _of_readings(
     strange: something that is in no catalogue acts on the mean. A curve misses steps and edges of it, nobody can say
     how far, so that errors about it say nothing of scatter. away [m]: by how far ends of walls may be elsewhere.
     """
-    rows = fit.assembly.smooth_rows(scans_of(assembly.shots.laser, _SCATTERED))
+    rows = fit.assembly.smooth_rows()
     few = fit.assembly.thinned(rows)
     few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
     statistics = Statistics(few, fit.normal.scan_noise)

@@ -15,6 +15,7 @@ _COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in
 _MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
 # Share of twice the root of a count likewise: a spread that differs by so little has a tenth more or less beyond 3 sds.
 _TAILS = 0.05
+_OWN = 0.1  # share of the variance of numbers that share readings which each has to itself
 _SILENT = 1e6  # sd of a number that says nothing
 _FAR = 5.0  # sds from which a number pulls no harder: what nothing explains yet must not bend what explains the others
 _DAMPED = 0.02  # share by which the curvature is raised: other draws make the slopes uncertain
@@ -32,12 +33,14 @@ class StatisticKinds:
 
     trends (g, m): from -1 to 1 over numbers of readings from near to far, or from straight to oblique; 0 elsewhere.
     folds (m,): logs of the ranges at which numbers tell how far readings scatter, less their mean; 0 elsewhere.
+    alike (m, m): correlations by the readings that numbers share, whatever these do.
     """
 
     counts: BoolArray
     places: BoolArray
     trends: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     folds: FloatArray = field(default_factory=lambda: np.empty(0))
+    alike: FloatArray | None = None
 
 
 class StatisticsLikelihood:
@@ -55,7 +58,9 @@ class StatisticsLikelihood:
         self.sd = np.where(kinds.counts, count_sd, np.hypot(spread, _MATTERS))
         self.sd = np.where(heard, self.sd, _SILENT)
         unit = (nulls - self.offset) / self.sd
-        half = 0.5 * (unit.T @ unit / len(nulls) + np.eye(len(measured)))  # few draws leave correlations uncertain
+        own = np.eye(len(measured))
+        expected = own if kinds.alike is None else (1 - _OWN) * kinds.alike + _OWN * own
+        half = 0.5 * (unit.T @ unit / len(nulls) + expected)  # few draws leave correlations uncertain
         self._covariance = (1 + _SIMULATED) * half
         self._log_det = float(np.linalg.slogdet(self._covariance)[1])
         self._most = np.abs(self.units(measured))
@@ -64,9 +69,10 @@ class StatisticsLikelihood:
         """Return how far numbers are from the model's own, in sds."""
         return np.asarray((numbers - self.offset) / self.sd)
 
-    def moves_places(self, change: FloatArray) -> bool:
-        """Return whether a change of the numbers (m,) moves the places of piles, by more than chance."""
-        return bool((np.abs(change / self.sd)[self._places] >= _FAR).any())
+    def places_off(self, numbers: FloatArray) -> FloatArray:
+        """Return how far the places of piles are off the measured ones, in sds; 0 where a small step leads there."""
+        off = ((numbers - self.measured) / self.sd)[self._places]
+        return np.where(np.abs(off) < _FAR, 0.0, off)
 
     def cost(self, numbers: FloatArray) -> float:
         """Return the negative log likelihood of the measured numbers for simulated ones, 0 for a perfect model."""

@@ -22,7 +22,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
-_FINELY = 4  # steps between two of these of what says where readings pile up
+_HALVED = 12  # times that the way between two of these is halved at most, where readings pile up between them
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
 _FARTHEST = 3.0  # such a step, in units of the first difference
@@ -124,22 +124,31 @@ class ScatterFit:
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
-                if any(self.likeness.moves_places(push.change) for push in found):
-                    yield from self._between(found, least, plain)
+                if found:
+                    yield from self._at_places(found, least, plain)
 
-    def _between(
+    def _at_places(
         self, found: Sequence[StatisticsChange], least: float, plain: FloatArray
     ) -> Iterator[StatisticsChange]:
-        """Yield a parameter's pushes at values between those tried; least: one that did nothing.
+        """Yield a parameter's pushes that bring the places of piles to where they are; least: a value that did nothing.
 
         Where readings pile up is known to a step of them: from half or twice as far off no small step leads there.
         """
-        values, null = sorted({least, *(push.value for push in found)}), self._simulate.null(found[0].effect)
-        for low, high in pairwise(values):
-            if low > 0:
-                for value in np.geomspace(low, high, _FINELY + 1)[1:-1].tolist():
-                    setting = EffectSetting(found[0].effect.id, {**null, found[0].name: value})
-                    yield replace(found[0], value=value, change=self._numbers((setting,), 1) - plain)
+        known = {least: plain, **{push.value: plain + push.change for push in found}}
+        null = self._simulate.null(found[0].effect)
+        for low, high in pairwise(sorted(known)):
+            off, end = (self.likeness.places_off(known[value]) for value in (low, high))
+            for place in np.flatnonzero(off * end < 0):
+                left, right = low, high
+                for _ in range(_HALVED):
+                    middle = float(np.sqrt(left * right)) if left > 0 else (left + right) / 2
+                    setting = EffectSetting(found[0].effect.id, {**null, found[0].name: middle})
+                    change = self._numbers((setting,), 1) - plain
+                    now = self.likeness.places_off(plain + change)[place]
+                    left, right = (middle, right) if now * off[place] > 0 else (left, middle)
+                    if not now:
+                        break
+                yield replace(found[0], value=middle, change=change)
 
     def candidates(self, without: set[type[Mechanism]]) -> Iterator[type[Mechanism]]:
         """Yield the effects that may be looked for, without some."""

@@ -12,15 +12,17 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends
+from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_ALONG = ("range", "incidence")  # in whose order readings are grouped, from near to far and from straight to oblique
-_PARTS = 4  # groups of either, and of reflectances at most
+# In whose order readings are grouped, from near to far and from straight to oblique, and at which quantiles: what grows
+# with the footprint does so in few, the most oblique ones.
+_ALONG = {"range": (0.25, 0.5, 0.75), "incidence": (0.5, 0.75, 0.9)}
+_SURFACES = 4  # groups by the reflectance, at most
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
 _WITHIN = 3.0  # sds of errors of poses, within which a reading may be one that is cut off
@@ -71,8 +73,9 @@ class Statistics:
         seen = assembly.marks.seen
         self._base = assembly.marks.base
         self._sd = assembly.first.sd
-        self._trust = assembly.geometry
-        self._farthest = assembly.shots.laser.range_max
+        self._trust, self._farthest = assembly.geometry, assembly.shots.laser.range_max
+        # What is not read by the model may be anything where readings are cut off: no return, or the last value.
+        self._read = assembly.mapped & (self._base > assembly.shots.laser.range_min) & (self._base < self._farthest)
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._layout, self._tau = assembly.layout, noise.lasting_tau
@@ -92,8 +95,7 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        said = readings[self._trust]
-        ends = cut_off_ends(said)
+        ends = self._ends(readings)
         left, common = self._leftover(error, ends)
         inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
@@ -107,15 +109,17 @@ class Statistics:
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
         out += [_share(np.isnan(readings[group])) for group in self._groups.masks]
         out.append(_share(np.isinf(readings[self._trust])))
-        out.append(_share(_once(self._edges.mixed(readings), self._layout.stand)))
-        return np.array([*out, *_values(said), _log(_spacing(said) / _GRID), *self._piles(ends)])
+        out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
+        said = readings[self._trust]
+        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(ends)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
 
         readings, error: as of `of`.
         """
-        left, _ = self._leftover(error, cut_off_ends(readings[self._trust]))
+        left, _ = self._leftover(error, self._ends(readings))
         _, _, free, known = self._fluctuating(left)
         return free**2, known
 
@@ -133,7 +137,17 @@ class Statistics:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([one.count for one in self._told()])
         places = np.arange(len(counts)) >= len(counts) - _PLACES
-        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds())
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds(), self._alike())
+
+    def _alike(self) -> FloatArray:
+        """Return correlations of the numbers (m, m): one reading that is missing is so in all groups it belongs to."""
+        told = self._told()
+        counts = [i for i, one in enumerate(told) if one.count and one.group is not None]
+        masks = np.array([mask.ravel() for mask in self._groups.masks], dtype=np.float64)
+        masks /= np.linalg.norm(masks, axis=1, keepdims=True)
+        out = np.eye(len(told))
+        out[np.ix_(counts, counts)] = masks @ masks.T
+        return out
 
     def _folds(self) -> FloatArray:
         """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
@@ -169,6 +183,10 @@ class Statistics:
             Statistic("lower cut-off of the readings", count=False, off=False),
             Statistic("upper cut-off of the readings", count=False, off=False),
         ]
+
+    def _ends(self, readings: FloatArray) -> tuple[float, float]:
+        """Return where readings (k, b) are cut off [m], those included that are too far out to be trusted."""
+        return cut_off_ends(readings[self._read])
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
         """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
@@ -230,11 +248,11 @@ class _Edges:
 
 def _groups(expected: BoolArray, ranges: FloatArray, incidence: FloatArray, returns: FloatArray) -> Groups:
     found: list[tuple[str, str, BoolArray]] = []
-    for kind, values in zip(_ALONG, (ranges, incidence), strict=True):
-        cuts = np.quantile(values[expected], np.linspace(0, 1, _PARTS + 1)[1:-1])
-        bins = np.digitize(values, cuts)
-        found += [(kind, f"{kind} {i + 1} of {_PARTS}", expected & (bins == i)) for i in range(_PARTS)]
-    for value in np.unique(returns[expected])[:_PARTS]:
+    for (kind, shares), values in zip(_ALONG.items(), (ranges, incidence), strict=True):
+        bins = np.digitize(values, np.quantile(values[expected], shares))
+        parts = len(shares) + 1
+        found += [(kind, f"{kind} {i + 1} of {parts}", expected & (bins == i)) for i in range(parts)]
+    for value in np.unique(returns[expected])[:_SURFACES]:
         found.append(("reflectance", f"reflectance {value:g}", expected & (returns == value)))
     kinds, names, masks = zip(*(each for each in found if each[2].any()), strict=True)
     logs = [np.log(np.median(ranges[m])) if kind == "range" else np.nan for kind, m in zip(kinds, masks, strict=True)]
@@ -285,13 +303,16 @@ def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
     return _log(_mean(sums[many] ** 2 / chance[many], 1.0))
 
 
-def _values(readings: FloatArray) -> list[float]:
-    """Return how many different values there are, and how many readings have the least and the greatest of them."""
+def _counts(readings: FloatArray) -> IntArray:
+    """Return how many readings have each value, from the least to the greatest."""
     steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
-    if not len(steps):
-        return [0.0, 0.0, 0.0]
-    counts = np.bincount(steps - steps.min())
-    return [_log(np.count_nonzero(counts)), _root(int(counts[0])), _root(int(counts[-1]))]
+    return np.bincount(steps - steps.min()) if len(steps) else np.zeros(1, dtype=np.int64)
+
+
+def _least_and_greatest(readings: FloatArray) -> tuple[float, float]:
+    """Return how many readings have the least and the greatest value, as roots of counts."""
+    counts = _counts(readings)
+    return _root(int(counts[0])), _root(int(counts[-1]))
 
 
 def _spacing(readings: FloatArray) -> float:

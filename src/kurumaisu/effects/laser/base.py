@@ -54,6 +54,7 @@ class Beams:
 class Echoes:
     """What the beams of a scan met, and what becomes of it on the way to a reading; all arrays are (n,).
 
+    Or of k scans in the order of their stamps: arrays are (k, n), bearings (n,), stamp and what is known (k, 1).
     stamp [s]; bearings [rad] as the message gives them; ranges [m], true; incidence [rad], 0 along the wall's normal,
     and where no effect of the chain is oblique; returns [1]: reflectance, 1 being the surface that the laser's law was
     measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
@@ -63,7 +64,7 @@ class Echoes:
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
-    stamp: float
+    stamp: float | FloatArray
     bearings: FloatArray
     ranges: FloatArray
     incidence: FloatArray
@@ -73,7 +74,7 @@ class Echoes:
     noise: FloatArray
     readings: FloatArray
     origins: FloatArray | None = None
-    known: Mapping[str, float] = field(default_factory=dict)
+    known: Mapping[str, float | FloatArray] = field(default_factory=dict)
 
 
 class LaserEffect(Mechanism):
@@ -103,4 +104,9 @@ class ReadingEffect(LaserEffect, ABC):
 
     @abstractmethod
     def apply(self, echoes: Echoes) -> Echoes:
-        """Return the echoes with this effect; scans come in the order of their stamps."""
+        """Return the echoes with this effect; scans come in the order of their stamps, one by one or many at once."""
+
+    def draws(self, count: int, echoes: Echoes) -> FloatArray:
+        """Return so many even numbers from 0 to 1 for each reading, (count, ...), scan by scan."""
+        shape = echoes.readings.shape
+        return np.moveaxis(self.rng.random((*shape[:-1], count, shape[-1])), -2, 0)

@@ -33,6 +33,6 @@ class BeamBias(ReadingEffect):
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean of each beam."""
         if self._unit is None:
-            self._unit = self.rng.standard_normal(len(echoes.bearings))
+            self._unit = self.rng.standard_normal(echoes.bearings.shape[-1])
         mirror = self.values["amplitude"] * np.cos(echoes.bearings - self.values["phase"])
         return replace(echoes, mean=echoes.mean + self.values["sd"] * self._unit + mirror)

@@ -25,7 +25,7 @@ class BeamCorrelation(ReadingEffect):
         """Filter the noise."""
         rho = self.values["rho"]
         innovations = np.sqrt(1 - rho**2) * echoes.noise
-        innovations[:1] = echoes.noise[:1]  # stationary from the first beam on
+        innovations[..., :1] = echoes.noise[..., :1]  # stationary from the first beam on
         from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
 
         return replace(echoes, noise=np.asarray(lfilter([1.0], [1.0, -rho], innovations)))

@@ -39,7 +39,7 @@ class LaserChain:
         return beams
 
     def read(self, echoes: Echoes) -> FloatArray:
-        """Return readings (n,) [m], neither rounded nor gated: +inf no return, NaN no valid reading.
+        """Return readings (n,) or (k, n) [m], neither rounded nor gated: +inf no return, NaN no valid reading.
 
         echoes: ranges may be +inf; mean, sd and noise as the laser has them without effects; readings do not count.
         """

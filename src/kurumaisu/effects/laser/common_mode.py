@@ -27,6 +27,8 @@ class CommonMode(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean of the scan."""
-        rho, draw = self.values["rho"], float(self.rng.standard_normal())
-        self._unit = draw if self._unit is None else rho * self._unit + np.sqrt(1 - rho**2) * draw
-        return replace(echoes, mean=echoes.mean + self.values["sd"] * self._unit)
+        rho, units = self.values["rho"], np.empty(np.shape(echoes.stamp))
+        for i, draw in enumerate(self.rng.standard_normal(units.size)):
+            self._unit = draw if self._unit is None else rho * self._unit + np.sqrt(1 - rho**2) * draw
+            units.flat[i] = self._unit
+        return replace(echoes, mean=echoes.mean + self.values["sd"] * units)

@@ -29,7 +29,7 @@ class Crosstalk(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Replace readings in the sector."""
-        chance, spread = self.rng.random((2, len(echoes.bearings)))
+        chance, spread = self.draws(2, echoes)
         away = np.abs(wrap(echoes.bearings - self.values["drift"] * (echoes.stamp - self.since)))
         hit = (away < self.values["width"] / 2) & (chance < self.values["probability"])
         return replace(echoes, readings=np.where(hit, spread * self.values["reach"], echoes.readings))

@@ -33,5 +33,5 @@ class Dropout(ReadingEffect):
         values = self.values
         chance = values["probability"] + values["per_metre"] * np.where(hit, echoes.ranges, 0.0)
         chance += values["oblique"] * (1 - np.cos(echoes.incidence)) + values["dark"] * (1 - echoes.returns)
-        dropped = hit & (self.rng.random(len(chance)) < chance)
+        dropped = hit & (self.rng.random(chance.shape) < chance)
         return replace(echoes, readings=np.where(dropped, np.nan, echoes.readings))

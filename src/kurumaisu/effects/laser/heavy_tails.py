@@ -41,9 +41,9 @@ class HeavyTails(ReadingEffect):
         if self.values["inverse_nu"] > 0:
             nu = 1 / self.values["inverse_nu"]
             narrower = (1 - 2 / nu) ** ((1 - self.values["core"]) / 2)
-            noise = noise * (narrower * np.sqrt(nu / self.rng.chisquare(nu, len(noise))))
+            noise = noise * (narrower * np.sqrt(nu / self.rng.chisquare(nu, noise.shape)))
         if self.values["outliers"] > 0:
-            wild = self.rng.random(len(noise)) < self.values["outliers"]
-            off = self.values["reach"] * self.rng.standard_normal(len(noise))
+            wild = self.rng.random(noise.shape) < self.values["outliers"]
+            off = self.values["reach"] * self.rng.standard_normal(noise.shape)
             noise = noise + np.where(wild, off / np.maximum(echoes.sd, _LEAST), 0.0)
         return replace(echoes, noise=noise)

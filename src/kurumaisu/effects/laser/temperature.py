@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """laser.temperature: ranges follow the room's temperature."""
 
-import math
 from dataclasses import replace
+
+import numpy as np
 
 from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
 from kurumaisu.effects.mechanism import Parameter
@@ -30,5 +31,5 @@ class Temperature(ReadingEffect):
             warmer = echoes.known["temperature"] - self.values["reference"]
         else:
             time = echoes.stamp - self.since
-            warmer = self.values["swing"] * math.sin(2 * math.pi * time / self.values["period"])
+            warmer = self.values["swing"] * np.sin(2 * np.pi * time / self.values["period"])
         return replace(echoes, mean=echoes.mean + self.values["coefficient"] * warmer)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """laser.warmup: ranges drift until the laser has warmed up."""
 
-import math
 from dataclasses import replace
+
+import numpy as np
 
 from kurumaisu.effects.laser.base import Echoes, LaserStage, ReadingEffect
 from kurumaisu.effects.mechanism import Parameter
@@ -24,5 +25,5 @@ class WarmUp(ReadingEffect):
 
     def apply(self, echoes: Echoes) -> Echoes:
         """Shift the mean by what is left."""
-        left = math.exp(-(echoes.stamp - self.since) / self.values["tau"])
+        left = np.exp(-(echoes.stamp - self.since) / self.values["tau"])
         return replace(echoes, mean=echoes.mean + self.values["amplitude"] * left)

@@ -36,8 +36,7 @@ def rows_of(rng: np.random.Generator, noise: Noise, end: float, flags: dict[str,
         extra = rng.choice(t[:-1], 12, replace=False)[:, None] + rng.uniform(0.001, 0.004, (12, 2))
         t = np.sort(np.concatenate([t, extra.ravel()]))
         t = t[np.concatenate([[True], np.diff(t) > 2e-4])]
-    stamp = t + rng.normal(size=len(t)) * noise.stamp
-    stamp = np.maximum.accumulate(stamp + 1e-6 * np.arange(len(t)))
+    stamp = later(t + rng.normal(size=len(t)) * noise.stamp)
     steps = int(end / 0.1) + 2
     slow = np.stack(
         [wandering(rng, steps, s, noise.slow, 0.1) for s in (noise.drift, noise.drift, noise.drift_heading)], axis=1
@@ -49,6 +48,13 @@ def rows_of(rng: np.random.Generator, noise: Noise, end: float, flags: dict[str,
         off[rng.choice(np.arange(5, len(t) - 5), 4, replace=False)] = True
         white[off] += rng.choice([-1, 1], (4, 3)) * rng.uniform([0.05, 0.05, 0.03], [0.3, 0.3, 0.15], (4, 3))
     return Rows(t, stamp, drift + white, off)
+
+
+def later(t: Array) -> Array:
+    """Stamps that grow: a row that is not later than all before it is stamped a microsecond after the latest."""
+    latest, at = np.maximum.accumulate(t), np.arange(len(t))
+    grown = np.diff(latest, prepend=-np.inf) > 0
+    return np.asarray(latest + 1e-6 * (at - np.maximum.accumulate(np.where(grown, at, 0))))
 
 
 def path(v: Array, w: Array, side: Array) -> Array:

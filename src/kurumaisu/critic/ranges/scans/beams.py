@@ -282,13 +282,9 @@ def read(
     moved (k, b) [m]: added to the mean, as errors of the poses are.
     """
     mean, sd = shots.laser.error.mean(seen.ranges) + moved, shots.laser.error.deviation(seen.ranges)
-    known = [{name: float(v[k]) for name, v in shots.known.items()} for k in range(len(shots.stamps))]
+    known = {name: values[:, np.newaxis] for name, values in shots.known.items()}
     parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known)
-    rows = [
-        chain.read(Echoes(stamp, shots.laser.bearings, *row))
-        for stamp, row in zip(shots.stamps.tolist(), zip(*parts, strict=True), strict=True)
-    ]
-    return np.array(rows)
+    return chain.read(Echoes(shots.stamps[:, np.newaxis], shots.laser.bearings, *parts))
 
 
 def predict(

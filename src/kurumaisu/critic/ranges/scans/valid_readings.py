@@ -17,7 +17,8 @@ _BESIDE = 0.025  # [rad] on each side of a corner or jump, a beam at least: erro
 # too; and what becomes of a footprint four times as long as wide is another equation for everybody.
 _STEEPEST = np.radians(75.0)
 _GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
-_PILED = 20  # readings of one value, the least or the greatest, that are a pile if hardly more lie beside them
+_PILED = 20  # readings of one value, the least or the greatest, that are a pile if they are
+_HIGHER = 3  # times as many as any value has that lies within the gate beside them
 _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 
@@ -77,15 +78,24 @@ def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
     ends = []
     for sign in (-1.0, 1.0):
         off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
-        grids = [grid for grid in _GRIDS if np.sum(off < grid) > max(_PILED, np.sum((off >= grid) & (off < _GATE)))]
+        grids = [grid for grid in _GRIDS if _piled(off[off < _GATE], grid)]
         within = float(np.max(off[off < grids[0]])) if grids else np.inf
         ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
     return ends[0], ends[1]
 
 
-def without_cut_off(readings: FloatArray) -> FloatArray:
-    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place."""
-    low, high = cut_off_ends(readings)
+def _piled(off: FloatArray, grid: float) -> bool:
+    """Return whether readings pile up at an end; off (n,) [m]: how far each lies inside of it."""
+    counts = np.bincount((off / grid).astype(np.int64), minlength=2)
+    return bool(counts[0] > max(_PILED, _HIGHER * counts[1:].max()))
+
+
+def without_cut_off(readings: FloatArray, ends: tuple[float, float] | None = None) -> FloatArray:
+    """Return readings [m] without those cut off, of which nobody knows where they are: NaN in their place.
+
+    ends [m]: where they are cut off, None: as they pile up.
+    """
+    low, high = ends or cut_off_ends(readings)
     with np.errstate(invalid="ignore"):
         return np.where((readings > low) & (readings < high), readings, np.nan)
 

@@ -191,13 +191,12 @@ class Assembly:
                 self.columns[:, :, form.span] = columns
                 self.forms[self.forms.index(form)] = replace(form, at=at)
 
-    def smooth_rows(self, most: int) -> IntArray:
-        """Return at most so many of the scans, evenly taken from those where the chair's path is smooth.
+    def smooth_rows(self) -> IntArray:
+        """Return the scans where the chair's path is smooth.
 
         Where a rate jumps nobody knows just where the chair was, and readings seem to scatter far.
         """
-        rows = np.flatnonzero(self._on_smooth_path())
-        return np.asarray(rows[np.unique(np.linspace(0, len(rows) - 1, most).astype(int))])
+        return np.flatnonzero(self._on_smooth_path())
 
     def thinned(self, rows: IntArray) -> Assembly:
         """Return some of the scans, without columns."""
@@ -208,7 +207,7 @@ class Assembly:
         out.layout = Layout(self.layout.times[rows], self.layout.run[rows], self.layout.stand[rows])
         out.motion = None if self.motion is None else [self.motion[row] for row in rows]
         out.residual, out.moved, out.poses = self.residual[rows], self.moved[rows], self.poses[rows]
-        out.geometry = self.geometry[rows]
+        out.geometry, out.mapped = self.geometry[rows], self.mapped[rows]
         out.first = BeamNoise(self.first.sd[rows], self.first.rho, self.first.valid[rows])
         return out
 
