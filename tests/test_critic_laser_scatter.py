@@ -178,10 +178,10 @@ def test_how_few_steep_readings_scatter_is_known_for_them():
 
 def test_scans_at_a_jump_of_the_rates_say_nothing_about_the_scatter(tmp_path):
     assembly = _assembly(tmp_path)
-    before = assembly.smooth_rows(len(assembly.hats))
+    before = assembly.smooth_rows()
     jumped = before[len(before) // 2]
     assembly.kinked[assembly.shots.run[jumped]][assembly.hats[jumped].rows] = True
-    left = assembly.smooth_rows(len(assembly.hats))
+    left = assembly.smooth_rows()
     assert jumped not in left
     assert len(left) >= len(before) - 3, "its neighbours rest on some of its poses, and no others do"
     assert len(assembly.thinned(left).shots.stamps) == len(left)

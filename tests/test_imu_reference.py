@@ -159,12 +159,17 @@ def test_what_the_scale_of_the_imu_explains_is_no_cause(scale):
     assert ("no more than the scale of the imu may be off by" in " ".join(found.story.details)) == (scale != 1.0)
 
 
-@pytest.mark.parametrize("parts", [("command", "odom"), ("command",)])
-def test_commands_are_held_against_the_imu_as_well(parts):
-    some = ["base.gain_w", "base.lag_w", "base.lag_v", "base.gain_v", "base.payload"]
+@pytest.mark.parametrize(
+    ("parts", "lags"), [(("command", "odom"), {"base.lag_v", "base.lag_w"}), (("command",), {"base.lag_w"})]
+)
+def test_commands_are_held_against_the_imu_and_as_far_as_there_is_one_against_odometry(parts, lags):
+    some = ["base.gain_w", "base.lag_w", "base.lag_v", "base.gain_v", "base.dead_zone_v"]
     found = turned(1, parts, only=some, turned=1 / 1.1)
-    assert set(causes(found)) == {"base.gain_w", "base.lag_w"}
-    assert causes(found)["base.lag_w"]["tau"].estimate == pytest.approx(0.25, abs=0.05)
+    assert set(causes(found)) == {"base.gain_w", *lags}
+    assert causes(found)["base.gain_w"]["gain"].estimate == pytest.approx(1 / 1.1 - 1, abs=0.01)
+    for lag in lags:
+        assert causes(found)[lag]["tau"].estimate == pytest.approx(0.25, abs=0.05)
+    assert ("effects on its speed were not looked for" in found.story.details[0]) == (parts == ("command",))
 
 
 def test_a_look_says_what_it_would_serve_for(tmp_path, capsys):
@@ -173,7 +178,7 @@ def test_a_look_says_what_it_would_serve_for(tmp_path, capsys):
     write_csv_run(tmp_path / "one", run_of("one", tables, Faults()))
     assert look.main([str(tmp_path / "one")]) == 0
     told = capsys.readouterr().out
-    assert "base: how far it turns, against the imu; how far it drives is not known" in told
+    assert "base: how far it turns, against the imu; how far it drives: not known" in told
     write_csv_run(
         tmp_path / "two", run_of("two", {**tables, "command": made["command"], "pose": made["pose"]}, Faults())
     )

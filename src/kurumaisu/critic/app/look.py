@@ -103,7 +103,8 @@ def missing(runs: Sequence[Run], meta: Meta) -> Iterator[str]:
     posed = [run for run in inputs if run.pose or run.odom]
     turned = bool(runs) and all(run.imu and not run.pose and not run.scan for run in runs)
     if turned:
-        yield "base: how far it turns, against the imu; how far it drives is not known: that takes poses"
+        drives = "against the odometry" if all(run.odom for run in inputs) and inputs else "not known: that takes poses"
+        yield f"base: how far it turns, against the imu; how far it drives: {drives}"
     elif posed:
         moving = _moving(posed)
         measured = all(run.pose for run in posed)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A reference where only an inertial sensor measured: how a robot turned is known, how far it went is not."""
+"""A reference where only an inertial sensor measured how a robot turned; how far it went its odometry says, at most."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ from kurumaisu.critic.imu.yaw_rate import heading
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.types import FloatArray
 
-# Errors of such a reference: its places say nothing [m], its headings err by less than stamps are off [rad].
-_NOWHERE, _HEADING_SD = 1.0e3, 1.0e-3
+# Errors of such a reference: its places say nothing [m], or as much as wheels and stamps of rows do; its headings
+# err by less than stamps are off [rad].
+_NOWHERE, _WAY_SD, _HEADING_SD = 1.0e3, 5.0e-3, 1.0e-3
 _APART = 0.02  # [s] between rows, at least
 _GAP = 0.5  # [s] without a row in which a turn is not known
-_SOURCE = "headings by the imu, along the way of {}, which nothing checks (no pose was measured)"
+_SOURCE = "headings by the imu, along the way of {}, {} (no pose was measured)"
+_CHECKS = {True: "in which slip of the wheels does not show", False: "which nothing checks"}
 
 
 def turning_only(recording: Recording) -> bool:
@@ -28,22 +30,29 @@ def turning_only(recording: Recording) -> bool:
 
 
 def with_turning(recording: Recording) -> Recording:
-    """Return a recording with headings by the imu for its reference, of which the places say nothing."""
-    runs = tuple(run if run.queries is not None else _turned(run) for run in recording.runs)
-    return replace(recording, runs=runs, truth=(_NOWHERE, _HEADING_SD), turning=True)
+    """Return a recording with headings by the imu for its reference.
+
+    Its places are those of the odometry, to which commands or voltages are compared; where there are no such two, they
+    say nothing.
+    """
+    known = [run for run in recording.runs if run.queries is None]
+    placed = all(run.odom is not None and (run.command is not None or run.voltage is not None) for run in known)
+    runs = tuple(run if run.queries is not None else _turned(run, placed=placed) for run in recording.runs)
+    truth = (_WAY_SD if placed else _NOWHERE, _HEADING_SD)
+    return replace(recording, runs=runs, truth=truth, turning=True, placed=placed)
 
 
-def _turned(run: Run) -> Run:
+def _turned(run: Run, *, placed: bool) -> Run:
     assert run.imu is not None
     name, since, gone = _way(run)
-    keep = np.unique(np.searchsorted(run.imu.t, np.arange(run.imu.t[0], run.imu.t[-1], _APART)))
-    t = run.imu.t[keep]
-    theta, way = heading(run.imu)[keep], np.interp(t, since, gone)
+    times = since if placed else np.arange(run.imu.t[0], run.imu.t[-1], _APART)
+    t = times[(times >= run.imu.t[0]) & (times <= run.imu.t[-1])]
+    theta, way = np.interp(t, run.imu.t, heading(run.imu)), np.interp(t, since, gone)
     rows = along(np.column_stack([np.diff(way), np.diff(theta)]))
     unknown = np.flatnonzero(np.diff(run.imu.t) > _GAP)
     lost = tuple((float(run.imu.t[i]), float(run.imu.t[i + 1])) for i in unknown)
     pose = Series(t, rows, ("x", "y", "theta"))
-    return replace(run, pose=pose, pose_source=_SOURCE.format(name), aside=(*run.aside, *lost))
+    return replace(run, pose=pose, pose_source=_SOURCE.format(name, _CHECKS[placed]), aside=(*run.aside, *lost))
 
 
 def _way(run: Run) -> tuple[str, FloatArray, FloatArray]:

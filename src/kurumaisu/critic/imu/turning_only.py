@@ -16,11 +16,13 @@ _UNSEEN = ("sd_v",)  # parameters of noise that was not measured
 _SCALE = 0.03  # share by which the scale of a gyro may be off
 SCALE_SD = _SCALE / 2
 EXPLAINED = -1.0  # no share
-_LIMITS = (
-    f"Only how the robot turned was measured, by the imu, whose own scale may be off by {100 * _SCALE:.0f} %. This "
-    "recording cannot tell how far it drives or slips, and effects on its speed were not looked for: a reference of "
-    "its pose tells them."
-)
+_LIMITS = {
+    True: "How the robot turned was measured by the imu, whose own scale may be off by {:.0%}; how far it drove, by "
+    "its odometry. This recording cannot tell how far its wheels slip: a reference of its pose does.",
+    False: "Only how the robot turned was measured, by the imu, whose own scale may be off by {:.0%}. This recording "
+    "cannot tell how far it drives or slips, and effects on its speed were not looked for: a reference of its pose "
+    "tells them.",
+}  # by whether anything says where it was
 
 
 def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
@@ -28,13 +30,15 @@ def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
     verdict, story = criticism.verdict, criticism.story
     if not recording.turning or verdict.verdict == "invalid_data":
         return criticism
+    story = replace(story, details=(_LIMITS[recording.placed].format(_SCALE), *story.details))
+    if recording.placed:
+        return replace(criticism, story=story)
     gain = verdict.gain
     if gain is not None:
         channels = {name: each for name, each in gain.channels.items() if name == _TURNS}
         verdict = replace(verdict, gain=replace(gain, rmse={}, channels=channels))
     story = replace(
         story,
-        details=(_LIMITS, *story.details),
         noise=tuple(each for each in story.noise if each.unit not in _LENGTHS),
         overlays=(),
     )

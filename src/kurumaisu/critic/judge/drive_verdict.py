@@ -56,7 +56,7 @@ def criticise_drives(
     test = [drive for name in recording.test for drive in drives.get(name, [])]
     made = decide(first, recording.truth, progress)
     # Where only turning was measured, places say what was asked for, in which nothing comes and goes.
-    going = None if recording.turning else unresolved.certain_intermittent(made, [*train, *test])
+    going = None if not recording.placed else unresolved.certain_intermittent(made, [*train, *test])
     if going is not None:
         progress("judging what is left without the moments in which something comes and goes")
         train, test = [going.freed(drive) for drive in train], [going.freed(drive) for drive in test]
@@ -88,7 +88,7 @@ def _looked_for(
     """Return those of these effects, None for all, that such drives can tell of."""
     if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
         ids = beside_odometry(ids)
-    return of_turning(ids) if recording.turning else ids
+    return ids if recording.placed else of_turning(ids)
 
 
 def _shares(recording: Recording, made: Decision) -> dict[str, float]:

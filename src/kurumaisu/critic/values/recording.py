@@ -110,7 +110,7 @@ class Recording:
     truth: sd of the reference pose, position [m] and heading [rad]; None = the critic estimates it.
     problems: all that the reader found wrong and mended or dropped, in words;
     invalid: those of the problems that forbid a verdict on causes; robot: what is said of it, None where nothing is;
-    turning: whether how the robot turned is all that was measured: the places of its poses say nothing.
+    turning: whether only an imu says how the robot turned; placed: whether the places of the poses say anything.
     """
 
     name: str
@@ -125,3 +125,4 @@ class Recording:
     invalid: tuple[str, ...] = ()
     robot: Robot | None = None
     turning: bool = False
+    placed: bool = True
