@@ -33,6 +33,16 @@ def test_a_chair_that_is_held_for_three_seconds_is_told_with_time_and_place(seed
     assert f"x {x:.2f}, y {y:.2f} m: a contact? {end - first:.1f} s set aside" in told
 
 
+def test_a_chair_that_is_held_is_seen_by_a_reference_of_uncertain_headings():
+    """Half a degree: between two rows 0.4 s apart it seems to turn by 0.03 rad/s."""
+    run = phased(np.random.default_rng(3), held=HELD)
+    noise = np.random.default_rng(4).normal(0.0, [0.003, 0.003, 0.009], run.pose.values.shape)
+    run = replace(run, pose=replace(run.pose, values=run.pose.values + noise))
+    ((first, end),) = contacts.contacts(run, MODEL)
+    assert first == pytest.approx(HELD[0], abs=0.6)
+    assert HELD[1] - 0.2 < end < HELD[1] + 1.5
+
+
 def test_what_it_did_while_it_was_held_is_not_judged():
     run = phased(np.random.default_rng(3), held=HELD)
     spans = contacts.contacts(run, MODEL)

@@ -11,6 +11,7 @@ from kurumaisu import geometry
 from kurumaisu.critic.base.drive import GRID, prepare
 from kurumaisu.critic.sanity.rows import stretches
 from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.types import BoolArray, FloatArray
@@ -19,6 +20,8 @@ TOPIC = "collision"  # a quantity that says so itself
 _ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
 _STANDS = 0.15  # share of that below which it stands
 _BEFORE = 0.6  # [s] for which it must have been asked
+_NOISE = 3.0  # sds of such a rate by errors of the reference, that one which stands may seem to have
+_MOST = 0.5  # share of what it is asked for that it may seem to have by them
 _WINDOW = 0.4  # [s] over which its rates are taken
 _LEAST = 0.6  # [s] of standing
 _LIKE = (0.7, 1.4)  # times what is asked for, of which it is known what the chair does elsewhere
@@ -54,6 +57,7 @@ def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
     wanted = _held(np.abs(asked) > _ASKED, round(_BEFORE / GRID))
     driven = np.abs(_rates(run.pose, t))
     small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
+    small = np.minimum(np.hypot(small, _NOISE * _rate_sds(run.pose)), np.maximum(_MOST * _ASKED, small))
     stands = inside & wanted.any(axis=1) & (driven < small).all(axis=1)
     for a, b in zip(*stretches(stands), strict=True):
         if (b - a) * GRID >= _LEAST and _is_odd(asked[a:b], asked, wanted, stands):
@@ -80,6 +84,12 @@ def _rates(pose: Series, t: FloatArray) -> FloatArray:
     """Return the rates v, w (n, 2) about times t (n,)."""
     before, after = (geometry.interpolate(pose.t, pose.values[:, :3], t + by) for by in (-_WINDOW / 2, _WINDOW / 2))
     return np.asarray(geometry.between(before, after)[:, [0, 2]] / _WINDOW)
+
+
+def _rate_sds(pose: Series) -> FloatArray:
+    """Return the sds of rates v, w (2,) by errors of the reference that differ from row to row."""
+    sds = third_difference_sd(pose.values[:, :3]) if len(pose.t) > 3 else np.zeros(3)
+    return np.asarray(np.sqrt(2) / _WINDOW * np.array([max(sds[:2]), sds[2]]))
 
 
 def _merged(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
