@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Beside an effect that does far more than small changes tell, nothing else is seen that is not there."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
+from kurumaisu.critic.ranges.search import dominant_effect
+from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.verdict import Cause
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -26,3 +32,15 @@ def test_scans_that_are_taken_nearly_at_once_have_no_other_fault(own, tmp_path):
     }
     assert [misfit.explained_by for misfit in found.pictures.misfits] == ["laser.sweep"]
     assert any(line.startswith("laser.sweep: changes the readings") for line in found.details)
+
+
+def test_what_is_still_missing_of_it_makes_no_set(monkeypatch):
+    monkeypatch.setattr(dominant_effect, "misfits", lambda *_: ())
+    assembly = SimpleNamespace(marks=SimpleNamespace(together=lambda _: np.zeros((1, 1))))
+    lead = EffectSetting("laser.clock_skew", {"skew": -0.002})
+    apart = ("laser.offset", "laser.warmup")
+    rest = LaserFinding(confounded=(("laser.clock_skew", "laser.latency"), apart))
+    found = dominant_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
+    assert found.confounded == (apart,)
+    assert [cause.id for cause in found.causes] == [lead.id]
+    assert found.settings == (lead,)

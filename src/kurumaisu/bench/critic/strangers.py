@@ -38,13 +38,17 @@ _Q = 0.5  # of a query's error beyond the model's own, in nats, a prediction tha
 
 @dataclass(frozen=True)
 class Case:
-    """One recording: what its author hid, what was said, what queries gained as a share of the oracle's, CPU [s]."""
+    """One recording: what its author hid, what was said, what queries gained as a share of the oracle's, CPU [s].
+
+    proposed: what to drive next was said, or why no drive can tell.
+    """
 
     truth: Mapping[str, Any]
     verdict: Verdict | None
     gain: float | None
     worse: bool
     cpu: float
+    proposed: bool = False
 
     @property
     def ids(self) -> set[str]:
@@ -134,7 +138,8 @@ def _case(job: Job) -> Case:
     except Error:
         return Case(truth, None, None, worse=False, cpu=cpu_time() - start)
     gain, worse = _gained(where / "answers.csv", found)
-    return Case(truth, found.verdict, gain, worse, cpu_time() - start)
+    proposed = found.verdict.next_experiment is not None or bool(found.story.next_drive)
+    return Case(truth, found.verdict, gain, worse, cpu_time() - start, proposed)
 
 
 def _gained(path: Path, found: Criticism) -> tuple[float | None, bool]:
@@ -200,7 +205,7 @@ def _rows(cases: Sequence[Case]) -> Iterator[tuple[str, str, str]]:
     yield "outside the catalogue: covariate", ">= .75", _share(lambda case: case.followed, of["unknown"])
     yield "confounded sets", ">= .93", right(strong["confounded"])
     sets = [case for case in cases if case.verdict is not None and case.verdict.confounded]
-    yield "with the next experiment", "all", _share(lambda case: case.verdict.next_experiment is not None, sets)  # type: ignore[union-attr]
+    yield "with the next experiment, or why none can tell", "all", _share(lambda case: case.proposed, sets)
     yield "wrong data recognised", ">= .95", right(of["wrong"])
     stated = [
         (cause.p, cause.id in case.ids)

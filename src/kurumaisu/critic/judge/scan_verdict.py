@@ -171,7 +171,8 @@ def _with_rest(
     setting, sds = lead
     cause = Cause(setting.id, evidence[0], estimates_of(setting, sds), evidence[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
-    rest = replace(rest, details=(*rest.details, *_sentences({setting.id: size}, ())))
+    said = tuple(line for line in rest.details if not line.startswith(f"{setting.id}: "))  # of what was left of it
+    rest = replace(rest, details=(*said, *_sentences({setting.id: size}, ())))
     return without_double_delay(with_dominant(rest, setting, cause, assembly, normal), assembly.shots.stamps)
 
 

@@ -66,7 +66,10 @@ def vanished_effects(assembly: Assembly, fit: FittedForms, refitted: ParameterFi
 def with_dominant(
     rest: LaserFinding, lead: EffectSetting, cause: Cause, assembly: Assembly, normal: NormalEquations
 ) -> LaserFinding:
-    """Return what was found with an effect in place, and the effect; cause: as it was found at first."""
+    """Return what was found with an effect in place, and the effect; cause: as it was found at first.
+
+    What is still missing of it is no question of whether it acts.
+    """
     again = next((each for each in rest.causes if each.id == lead.id), None)
     if again is not None:
         cause = replace(cause, parameters=again.parameters)
@@ -78,6 +81,7 @@ def with_dominant(
     return replace(
         rest,
         causes=(cause, *(each for each in rest.causes if each is not again)),
+        confounded=tuple(group for group in rest.confounded if lead.id not in group),
         settings=rest.settings if moved else (lead, *rest.settings),
         pictures=replace(rest.pictures, misfits=(*shown, *others)),
     )
