@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.data.clean import Faults, Table, clean, spared
+from kurumaisu.critic.data.clean import Faults, Table, clean_part
 from kurumaisu.critic.data.completion import completed
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.csv_reader import IMU, OPTIONAL, QUERY, REQUIRED, check_queries
@@ -81,7 +81,7 @@ def run_of(name: str, tables: Tables, faults: Faults, meta: Meta | None = None) 
             continue
         columns = _columns(where, part, rows.shape[1] - 1)
         table = Table(where, rows[:, 0], rows[:, 1:], columns, "row", 0)
-        series = spared(table, faults) if part == "imu" else clean(table, faults, ranges=part == "scan")
+        series = clean_part(part, table, faults)
         if part in REQUIRED:
             parts[part] = series
         elif series is not None:

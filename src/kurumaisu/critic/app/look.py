@@ -18,14 +18,14 @@ from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
 from kurumaisu.critic.bags.topics import Topic
-from kurumaisu.critic.data.bag_reader import PARTS, TOPICS, mappings, read_bag_topics, wanted_of
+from kurumaisu.critic.data.bag_reader import TOPICS, mappings, read_bag_topics, wanted_of
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
 from kurumaisu.critic.data.wheel_reader import JOINTS
-from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.critic.values.recording import PARTS, Run, Series
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray

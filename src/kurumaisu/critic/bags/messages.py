@@ -10,11 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kurumaisu.critic.values.recording import Fan
+from kurumaisu.critic.values.recording import PARTS, Fan
 from kurumaisu.plausible import yaw_or_nan
 
-# Parts of a run that have a type of their own; any other topic is a covariate.
-PARTS = ("command", "voltage", "pose", "odom", "imu", "scan")
 COLUMNS = {
     "command": ("v", "w"),
     "voltage": ("v_f", "v_s", "v", "w"),

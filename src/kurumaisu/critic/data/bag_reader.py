@@ -18,13 +18,13 @@ from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
 from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
-from kurumaisu.critic.data.clean import Faults, Table, clean, spared
+from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
 from kurumaisu.critic.data.counters import Spans
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS
 from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
 from kurumaisu.critic.imu.yaw_rate import UNUSED
-from kurumaisu.critic.values.recording import Fan, Run, Series, run_of_parts
+from kurumaisu.critic.values.recording import PARTS, Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
 from kurumaisu.names import hint
@@ -42,7 +42,6 @@ TOPICS = {
     "temperature": "temperature",
 }
 SCRIPTED = "/experiment_vel"  # the command where there is no cmd_vel: critic experiment's
-PARTS = messages.PARTS
 PutAside = Callable[[FloatArray, FloatArray | None], int]
 # Stamps and times of receipt further apart than this do not come from one clock [s].
 CLOCK_TOLERANCE = 1.0
@@ -79,7 +78,7 @@ def read_bag_run(
         elif part in PARTS:
             columns, rows = _said(part, topic, keep)
             table = Table(where, topic.times()[keep], rows, columns, "message", 1)
-            series[part] = spared(table, faults) if part == "imu" else clean(table, faults)
+            series[part] = clean_part(part, table, faults)
         else:
             covariates.update(_covariates(part, where, topic, keep, faults))
     lost = _work_out(path, meta, series, faults)

@@ -89,7 +89,12 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
 
 
-def spared(table: Table, faults: Faults) -> Series | None:
+def clean_part(part: str, table: Table, faults: Faults) -> Series | None:
+    """Return the rows of a part of a run, cleaned as it needs; faults gets what was wrong."""
+    return _spared(table, faults) if part == "imu" else clean(table, faults, ranges=part == "scan")
+
+
+def _spared(table: Table, faults: Faults) -> Series | None:
     """Return the rows of a part that nobody need have, as clean does: where most are of no use, it is left out."""
     own = Faults()
     series = clean(table, own)

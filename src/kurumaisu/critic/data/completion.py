@@ -59,9 +59,7 @@ def _guide(run: Run) -> Guide | None:
     plain = _guide_without_imu(run)
     if run.imu is None or plain is None:
         return plain
-    t = run.imu.t
-    ahead = plain.v[np.clip(np.searchsorted(plain.t, t, side="right") - 1, 0, None)]
-    return Guide("the imu", t, heading(run.imu), ahead, steady=True)
+    return Guide("the imu", run.imu.t, heading(run.imu), plain.speeds(run.imu.t), steady=True)
 
 
 def _guide_without_imu(run: Run) -> Guide | None:

@@ -6,11 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.values.recording import LaserMount, Run, Series
+from kurumaisu.critic.values.recording import LONGEST_HOLD, LaserMount, Run, Series
 from kurumaisu.errors import Error
 
-# A command is held, but not for longer than this beyond its table [s].
-LONGEST_HOLD = 60.0
 # No laser of this kind sees further: ranges whose median is above it are millimetres.
 FARTHEST_MEDIAN = 100.0
 

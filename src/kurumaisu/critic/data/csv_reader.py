@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kurumaisu.bounded_files import MOST_TABLE, read_text
-from kurumaisu.critic.data.clean import Faults, Table, clean, spared
+from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
 from kurumaisu.critic.data.odometry import with_wheels
 from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
 from kurumaisu.critic.imu.yaw_rate import ACCELERATIONS, RATE, RATES
@@ -127,7 +127,7 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
     if own:
         values = rows[:, [columns.index(name) for name in own]]
         table = Table(where, t, values, own, "line", 2)
-        series = spared(table, faults) if part == "imu" else clean(table, faults, ranges=part == "scan")
+        series = clean_part(part, table, faults)
     covariates = {}
     for name in columns:
         if name not in ("t", *own):

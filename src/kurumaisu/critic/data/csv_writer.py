@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.critic.values.recording import PARTS, Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray
 from kurumaisu.whole_files import write_whole
@@ -26,7 +26,7 @@ def write_csv_run(folder: Path, run: Run) -> None:
     except OSError as error:
         raise Error(f"{folder}: {error.strerror}") from error
     tables = {}
-    for part in ("command", "voltage", "pose", "odom", "imu", "scan"):
+    for part in PARTS:
         series: Series | None = getattr(run, part)
         if series is not None:
             tables[part] = _text(("t", *series.columns), np.column_stack([series.t, series.values]))

@@ -33,6 +33,10 @@ class Guide:
     v: FloatArray
     steady: bool = False
 
+    def speeds(self, at: FloatArray) -> FloatArray:
+        """Return v (m,) [m/s] at times at (m,), held from row to row."""
+        return np.asarray(self.v[np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, None)])
+
 
 def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float]:
     """Return positions x, y with theta, and over how long a way each heading was measured [m].
@@ -44,7 +48,7 @@ def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float
     t, places = positions.t, positions.values[:, :2]
     way = max(_SHORTEST, _NOISES * _noise(places))
     theta = np.zeros(len(t)) if guide is None else np.interp(t, guide.t, guide.theta)
-    ahead = np.ones(len(t)) if guide is None else np.sign(guide.v[np.clip(_before(guide.t, t), 0, None)])
+    ahead = np.ones(len(t)) if guide is None else np.sign(guide.speeds(t))
     found = [
         ((t[i] + t[j]) / 2, _course(places[j] - places[i], ahead[i]) - theta[i : j + 1].mean())
         for i, j in _ways(t, places, theta, ahead, way)
@@ -72,18 +76,15 @@ def _trend(times: FloatArray, offsets: FloatArray, at: FloatArray, t: FloatArray
     def columns(when: FloatArray, said: FloatArray) -> FloatArray:
         return np.column_stack([np.ones(len(when)), (when - t[0]) / max(t[-1] - t[0], 1.0), said / scale])
 
-    found, *_ = np.linalg.lstsq(columns(times, at), offsets, rcond=None)
-    left = offsets - columns(times, at) @ found
+    known = columns(times, at)
+    found, *_ = np.linalg.lstsq(known, offsets, rcond=None)
+    left = offsets - known @ found
     smooth = np.empty(len(times))
     first, end = (np.searchsorted(times, times + side * 3 * _STEADY) for side in (-1, 1))
     for i, near in enumerate(map(slice, first, end)):
         weight = np.exp(-0.5 * ((times[near] - times[i]) / _STEADY) ** 2)
         smooth[i] = weight @ left[near] / weight.sum()
     return np.asarray(columns(t, theta) @ found + np.interp(t, times, smooth))
-
-
-def _before(times: FloatArray, at: FloatArray) -> FloatArray:
-    return np.asarray(np.searchsorted(times, at, side="right") - 1)
 
 
 def _noise(places: FloatArray) -> float:

@@ -19,7 +19,7 @@ from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, re
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
 from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_rawlog_run
-from kurumaisu.critic.values.recording import LaserMount, Recording, Run
+from kurumaisu.critic.values.recording import PARTS, LaserMount, Recording, Run
 from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
@@ -191,5 +191,5 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
 
 
 def _has(run: Run) -> str:
-    parts = [part for part in ("command", "voltage", "pose", "odom", "imu", "scan") if getattr(run, part) is not None]
+    parts = [part for part in PARTS if getattr(run, part) is not None]
     return f"only {' and '.join(parts)}" if parts else "no part of a run"

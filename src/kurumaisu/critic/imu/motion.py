@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.critic.values.recording import LONGEST_HOLD, Run, Series
 from kurumaisu.types import BoolArray, FloatArray
 
 STEP = 0.1  # [s] between the middles of spans that are compared
@@ -16,7 +16,6 @@ SPAN = 1.0  # [s] over which rates are averaged
 _GAP = 0.5  # [s] without rows that a span may hold
 _LATE = 1.5  # [s] for which a robot may move on that was asked to rest
 _REST = (0.005, 0.005)  # [m/s], [rad/s] mean rates below which odometry stands
-_HOLD = 60.0  # [s] that a command is held beyond its table; see consistency.LONGEST_HOLD
 
 
 @dataclass(frozen=True)
@@ -78,7 +77,7 @@ def stands(run: Run, at: FloatArray) -> BoolArray:
 
 def _held(command: Series) -> tuple[FloatArray, FloatArray]:
     """Return times (m,) and how far commands that are held until the next have asked to go and turn, (m, 2)."""
-    t = np.append(command.t, command.t[-1] + _HOLD)
+    t = np.append(command.t, command.t[-1] + LONGEST_HOLD)
     steps = np.diff(t)[:, None] * np.column_stack([command.column(name) for name in "vw"])
     whole = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
     # What is held for long has no gap.

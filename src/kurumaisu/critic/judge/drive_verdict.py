@@ -13,8 +13,6 @@ from kurumaisu.critic.experiment.proposal import drives as scripted_drives
 from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
-from kurumaisu.critic.heldout.materiality import share_of_way
-from kurumaisu.critic.imu.turning_only import beyond_imu
 from kurumaisu.critic.judge import excitation, explain, explain_unknown, multipliers, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
@@ -27,7 +25,7 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry, of_turning
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import Gain, Multipliers, RobotTaken
+from kurumaisu.critic.values.verdict import Gain, RobotTaken
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 
@@ -75,9 +73,10 @@ def criticise_drives(
     proposal = propose(made.problem, made.found, scripts)
     judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
-    shares = _shares(recording, made)
+    shares = explain.shares_of(made, turning=recording.turning)
     judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
-    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=_multipliers(recording, made))
+    found = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
+    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=found)
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
 
@@ -89,17 +88,6 @@ def _looked_for(
     if all(drive.source == "odom" for name in recording.train for drive in drives.get(name, [])):
         ids = beside_odometry(ids)
     return ids if recording.placed else of_turning(ids)
-
-
-def _shares(recording: Recording, made: Decision) -> dict[str, float]:
-    """Return by which share each effect that was found moves the robot, by its id."""
-    best = made.found.best.settings
-    shares = {name: share_of_way(made.problem, best, explain.without(best, name)) for name in made.found.best.ids}
-    return beyond_imu(shares) if recording.turning else shares
-
-
-def _multipliers(recording: Recording, made: Decision) -> Multipliers | None:
-    return multipliers.measured(made.problem, made.found.best, turning=recording.turning)
 
 
 def _held_out(

@@ -112,6 +112,13 @@ def criticism(
     return Criticism(verdict, story, problem.model, (*settings, process_noise(problem)))
 
 
+def shares_of(made: Decision, *, turning: bool) -> dict[str, float]:
+    """Return by which share each effect that was found moves the robot, by its id; turning: as of _materiality."""
+    problem, best = made.problem, made.found.best
+    shares = {name: share_of_way(problem, best.settings, without(best.settings, name)) for name in sorted(best.ids)}
+    return beyond_imu(shares) if turning else shares
+
+
 def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[bool, dict[str, float], set[str]]:
     """Return whether held-out drives confirm what was found, how far each effect moves the chair, and which matter.
 
@@ -122,12 +129,9 @@ def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[b
     # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
     held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
     gains = made.found.enough and (held or made.untested)
-    others = {name: without(best.settings, name) for name in sorted(best.ids)}
-    shares = {name: share_of_way(problem, best.settings, rest) for name, rest in others.items()}
-    felt = {name: share_of_noise(problem, best.settings, rest) for name, rest in others.items()}
-    if turning:
-        shares = beyond_imu(shares)
-        felt = {name: 0.0 if shares[name] == EXPLAINED else size for name, size in felt.items()}
+    shares = shares_of(made, turning=turning)
+    felt = {name: share_of_noise(problem, best.settings, without(best.settings, name)) for name in shares}
+    felt = {name: 0.0 if shares[name] == EXPLAINED else size for name, size in felt.items()}
     return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
 
 

@@ -9,13 +9,11 @@ import numpy as np
 from scipy.signal import fftconvolve
 
 from kurumaisu import geometry
-from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.recording import LONGEST_HOLD, Series
 from kurumaisu.types import FloatArray
 
 STEP = 0.1  # [s] of the grid
 SPAN = 1.0  # [s] over which rates are averaged: what lags and a noisy reference do to them is then small
-# An input holds beyond its last row for as long as that [s]; see consistency.LONGEST_HOLD.
-_HOLD = 60.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +45,7 @@ def of_poses(pose: Series, t: FloatArray) -> Rates:
 
 def of_input(times: FloatArray, values: FloatArray, t: FloatArray) -> Rates:
     """Return the means of samples (n, 2) held until the next; nan before the first and long after the last."""
-    knots = np.append(times, times[-1] + _HOLD)
+    knots = np.append(times, times[-1] + LONGEST_HOLD)
     steps = np.diff(knots)[:, None] * values
     integral = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
     mean = [

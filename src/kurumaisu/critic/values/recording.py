@@ -40,6 +40,12 @@ class Fan:
     scan_time: float
 
 
+# Parts of a run that have a type of their own; any other quantity is a covariate.
+PARTS = ("command", "voltage", "pose", "odom", "imu", "scan")
+# An input is held, but not for longer than this beyond its table [s].
+LONGEST_HOLD = 60.0
+
+
 @dataclass(frozen=True)
 class Run:
     """One drive. Any part may be missing.

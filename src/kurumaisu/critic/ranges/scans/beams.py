@@ -110,7 +110,7 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
     laser = laser_of(model.laser, recording.laser, recording.runs)
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
-    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, scans_of(laser, MOST_SCANS)).astype(int))]
+    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, _most_scans(laser)).astype(int))]
     zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
@@ -321,9 +321,9 @@ def moved_by_pose(shots: Shots, seen: BeamHits, base: FloatArray | None = None) 
     return np.asarray(np.nan_to_num(np.stack(out, axis=-1)))
 
 
-def scans_of(laser: Laser, count: int) -> int:
-    """Return how many scans are about as much to do as count of an URG-04LX's."""
-    return int(count * np.clip(_FAN / laser.beams, 1.0, _MORE))
+def _most_scans(laser: Laser) -> int:
+    """Return how many scans are about as much to do as MOST_SCANS of an URG-04LX."""
+    return int(MOST_SCANS * np.clip(_FAN / laser.beams, 1.0, _MORE))
 
 
 def thin(shots: Shots, most: int) -> Shots:

@@ -157,18 +157,8 @@ def echoes_of(shots: Shots, seen: BeamHits) -> Echoes:
     """Return what the beams (k, b) of all scans meet, for curves over it; of nothing, at a range of 0."""
     still = np.where(np.isfinite(seen.ranges), seen.ranges, 0.0)
     bearings = np.broadcast_to(shots.laser.bearings, still.shape)
-    return Echoes(
-        shots.stamps[:, np.newaxis],
-        bearings,
-        still,
-        seen.incidence,
-        seen.returns,
-        still,
-        still,
-        still,
-        still,
-        seen.origins,
-    )
+    parts = (still, seen.incidence, seen.returns, still, still, still, still, seen.origins)
+    return Echoes(shots.stamps[:, np.newaxis], bearings, *parts)
 
 
 def _knots(values: FloatArray) -> FloatArray:
