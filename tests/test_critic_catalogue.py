@@ -14,7 +14,7 @@ from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.judge import drive_verdict, explain
+from kurumaisu.critic.judge import explain
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped
@@ -60,8 +60,8 @@ def test_a_lever_to_the_side_is_exactly_a_leak_of_turns_and_said_as_a_set():
 
 
 def test_a_set_of_which_nothing_matters_is_not_told(monkeypatch):
-    for module, share in ((explain, "share_of_way"), (explain, "share_of_noise"), (drive_verdict, "share_of_way")):
-        monkeypatch.setattr(module, share, lambda problem, settings, without: 0.0)
+    for share in ("share_of_way", "share_of_noise"):
+        monkeypatch.setattr(explain, share, lambda problem, settings, without: 0.0)
     verdict = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None).verdict
     assert (verdict.verdict, verdict.confounded) == ("none", ())
 
