@@ -141,12 +141,17 @@ RATES["base.dead_zone_w"] = _each(lambda p, v, w: (v, 0.0, _swallowed("steering"
 
 @_rates("base.backlash")
 def backlash(p, drive):
-    """A peg in a slot as wide as the play; or a string of that length that pulls a turn up, and does not push it."""
+    """A peg in a slot as wide as the play; with onset, a slot for each side that ends where no turn is.
+
+    With onset = 1 that is a string as long as the play, which pulls a turn up and does not push it.
+    """
     half, peg, out = p["play"] / 2, 0.0, []
     for v, w in zip(drive.v, drive.w, strict=True):
         if p["onset"] >= 0.5:
-            held = peg if peg * w > 0 else 0.0
-            peg = math.copysign(min(abs(w), max(abs(held), abs(w) - p["play"])), w)
+            held = abs(peg) if peg * w > 0 else 0.0
+            near = abs(w) - p["onset"] * p["play"]
+            far = abs(w) + (1 - p["onset"]) * p["play"]
+            peg = math.copysign(min(far, max(held, near)), w) if w else 0.0
             out.append(peg)
             continue
         if w - half > peg:

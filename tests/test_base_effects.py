@@ -157,11 +157,17 @@ def test_backlash_drags_and_lets_go_at_rest():
     np.testing.assert_allclose(apply("base.backlash", {"play": 0.2}, v, w).w, expected, atol=1e-12)
 
 
-def test_backlash_taken_up_at_the_onset_is_lost_while_a_turn_grows():
-    """Each side by itself: what begins to turn to the other one takes up its own play."""
+@pytest.mark.parametrize(
+    ("onset", "expected"),
+    [
+        (0.5, [0.0, 0.4, 0.4, 0.3, 0.0, 0.2, -0.2, -0.2, -0.2]),
+        (1.0, [0.0, 0.3, 0.3, 0.2, 0.0, 0.1, -0.1, -0.1, -0.1]),
+    ],
+)
+def test_backlash_of_each_side_by_itself(onset, expected):
+    """What begins to turn to the other side takes up its own play; at the onset it is lost while a turn grows."""
     w = np.array([0.1, 0.5, 0.4, 0.2, 0.0, 0.3, -0.3, -0.25, -0.1])
-    expected = [0.0, 0.3, 0.3, 0.2, 0.0, 0.1, -0.1, -0.1, -0.1]
-    moved = apply("base.backlash", {"play": 0.2, "onset": 1.0}, np.ones(len(w)), w).w
+    moved = apply("base.backlash", {"play": 0.2, "onset": onset}, np.ones(len(w)), w).w
     np.testing.assert_allclose(moved, expected, atol=1e-12)
 
 

@@ -8,18 +8,17 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
-from kurumaisu.critic.ranges.search.effect_sets import FittedForms
-from kurumaisu.critic.ranges.search.spurious_effects import form_families, without_spurious
+from kurumaisu.critic.ranges.search.block_evidence import compare_blocks
+from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
-from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
-from kurumaisu.critic.unknown.curves import CurveEvidence
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
+from kurumaisu.critic.ranges.signals.form_error import DrawnCurve, FormFamily, form_family, integrated_out
 from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 SCANS, BEAMS, WALLS = 20, 60, 12
+SIZE = SimpleNamespace(name="bias", null=0.0, scale=1.0, lower=-1e9, upper=1e9)
 
 
 def scene(rng):
@@ -32,7 +31,9 @@ def scene(rng):
         origins=np.zeros((SCANS, BEAMS, 3)),
     )
     shots = SimpleNamespace(
-        stamps=np.linspace(0.0, 300.0, SCANS), laser=SimpleNamespace(bearings=np.linspace(-2.0, 2.0, BEAMS))
+        stamps=np.linspace(0.0, 300.0, SCANS),
+        laser=SimpleNamespace(bearings=np.linspace(-2.0, 2.0, BEAMS), beams=BEAMS),
+        known={"v": rng.uniform(-0.5, 0.5, SCANS), "w": rng.uniform(-0.5, 0.5, SCANS)},
     )
     return shots, seen, wall
 
@@ -52,16 +53,19 @@ def test_what_an_effect_follows_is_found_by_drawing_what_it_does(covariate, chan
     shots, seen, _ = scene(np.random.default_rng(0))
     moved = change(shots, seen)
     found = form_family(moved, shots, seen, np.ones(moved.shape, dtype=bool))
-    assert (found and found.covariate) == covariate
     if found is None:
+        assert not moved.any()
         return
+    assert {curve.covariate for curve in found.curves if curve.signal is None} == {covariate} - {None}
+    multiplied = {curve.covariate for curve in found.curves if curve.signal is not None}
+    assert multiplied == {"time", "range", "incidence", "bearing"} - {covariate}
     columns = found.columns(shots, seen).reshape(moved.size, -1)
     drawn = columns @ np.linalg.lstsq(columns, moved.ravel(), rcond=None)[0]
     assert np.std(moved.ravel() - drawn) < 0.05 * np.std(moved)
     gram = columns.T @ columns
     prior = found.scaled(gram, float(moved.ravel() @ moved.ravel()))
     # Drawn from that, curves are as large as the share that nobody can refuse.
-    assert np.trace(gram @ prior) == pytest.approx(FORM_ERROR**2 * np.sum(moved**2))
+    assert np.trace(gram @ prior) == pytest.approx(len(found.curves) * FORM_ERROR**2 * np.sum(moved**2))
 
 
 @pytest.mark.parametrize("readings", [0, 1, SCANS * BEAMS])
@@ -73,7 +77,7 @@ def test_what_is_the_same_everywhere_is_drawn_by_finite_curves(readings):
     assert (found is None) == (readings < 2)
     if found is not None:
         assert np.isfinite(found.columns(shots, seen)).all()
-        assert np.isfinite(found.prior).all()
+        assert all(np.isfinite(curve.prior).all() for curve in found.curves)
 
 
 def test_coefficients_integrated_out_are_noise_of_their_covariance():
@@ -92,33 +96,23 @@ def test_dark_walls_that_are_read_by_another_law_are_not_walls_that_are_off(move
     shots, seen, wall = scene(rng)
     dark = 1 - seen.returns
     columns = np.concatenate([dark[:, :, np.newaxis], wall[:, :, np.newaxis] == np.arange(WALLS)], axis=2)
-    form = Form("laser.reflectance", {}, (SimpleNamespace(),), 0)
+    form = Form("laser.reflectance", {}, (Column(SIZE, False, {}),), 0)
     off = rng.standard_normal(WALLS)[wall] * moved
     residual = 40 * dark**1.6 + 2 * off + rng.standard_normal(dark.shape)  # in sds of readings
 
-    def products(_, columns, residual):
-        rows = np.concatenate([columns, residual[:, :, np.newaxis]], axis=2).reshape(dark.size, -1)
-        return rows.T @ rows
-
-    assembly = SimpleNamespace(
-        columns=columns,
-        shots=shots,
-        marks=SimpleNamespace(seen=seen),
-        residual=residual,
-        products=products,
-        forms=[form],
-    )
-    normal = SimpleNamespace(beam_noise=SimpleNamespace(valid=np.ones(dark.shape, dtype=bool)))
-    size = float(np.sum(dark * residual) / np.sum(dark**2))
-    fit = FittedForms((form,), np.array([size]), np.array([0.1]), 1e5, 1e5)
-    none = FittedForms((), np.empty(0), np.empty(0), 0.0, 0.0)
+    change = dark * float(np.sum(dark * residual) / np.sum(dark**2))
+    family = form_family(change, shots, seen, np.ones(dark.shape, dtype=bool))
+    assert family is not None
+    every = np.concatenate([columns, family.columns(shots, seen), residual[:, :, np.newaxis]], axis=2)
+    every = every.reshape(dark.size, -1)
+    gram, count = every.T @ every, columns.shape[2]
     walls = Block("world.map_error", SimpleNamespace(), None, (np.eye(WALLS),), slice(1, 1 + WALLS))
-    winner = SetWithBlock(fit, walls, CurveEvidence(100.0, np.eye(WALLS)), 1e5 + 100)
-    found = SimpleNamespace(fits=(fit, none), p={f"effect {i}": 0.0 for i in range(25)})
-    others = form_families(assembly, normal, fit)
-    assert others["laser.reflectance"].covariate == "returns"
-    assert without_spurious(assembly, normal, found, (fit, winner), {}) == (fit, winner)
-    assert without_spurious(assembly, normal, found, (fit, winner), others) == (fit, winner if moved else None)
+    found = FormSearch([form], gram).run()
+    exact = compare_blocks(found, [walls], gram, {})
+    nearly = compare_blocks(found, [walls], gram, {form.id: (slice(count, every.shape[1] - 1), family)})
+    assert exact.winner is not None
+    assert (nearly.winner is not None) == moved
+    assert nearly.found.best.ids == {"laser.reflectance"}
 
 
 @pytest.mark.parametrize("common", [0.0, 0.002])
@@ -132,6 +126,6 @@ def test_a_warm_up_of_another_form_leaves_no_common_mode_and_hides_none(tmp_path
 
 
 def test_steps_of_reflectance_need_no_straight_lines():
-    found = FormFamily("returns", np.array([0.4, 1.0]), np.eye(2))
+    found = FormFamily((DrawnCurve("returns", np.array([0.4, 1.0]), np.eye(2)),))
     seen = SimpleNamespace(returns=np.array([[1.0, 0.4, 1.0]]))
     assert found.columns(SimpleNamespace(), seen).tolist() == [[[0.0, 1.0], [1.0, 0.0], [0.0, 1.0]]]

@@ -63,7 +63,7 @@ def test_beside_walls_that_are_where_they_like_an_effect_needs_evidence_only(siz
     own = Column(Parameter("quadratic", "1/m", null=0.0, scale=1.0, lower=-9.0, upper=9.0), False, {})
     quadratic = Form("laser.quadratic", {}, (own,), 0)
     free = Block("world.map_error", own.parameter, None, (np.eye(12),), slice(1, 13))
-    winner = compare_blocks(FormSearch([quadratic], gram).run(), [free], gram).winner
+    winner = compare_blocks(FormSearch([quadratic], gram).run(), [free], gram, {}).winner
     assert winner is not None
     assert winner.free is free
     assert winner.fit.ids == found

@@ -7,13 +7,15 @@ import numpy as np
 
 from kurumaisu import _core
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
+from kurumaisu.types import FloatArray
 
 
 class Backlash(Effect):
     """Yaw rate dragged along by its command with play; a chair commanded to rest rests.
 
-    onset: with 0 a rate that grows and one that falls miss the command by half of the play each; with 1 the play is
-    taken up by what begins to turn, so that a rate that grows misses all of it and one that falls nothing.
+    onset: with 0 a rate that grows and one that falls miss the command by half of the play each. With 0.5 each side
+    does so by itself, and a chair that is asked to drive straight does. With 1 the play is taken up by what begins to
+    turn, so that a rate that grows misses all of it and one that falls nothing.
     """
 
     id = "base.backlash"
@@ -22,11 +24,12 @@ class Backlash(Effect):
         Parameter("play", "rad/s", null=0.0, scale=0.03, lower=0.0, upper=1.0),
         Parameter("onset", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
     )
-    forms = ({"onset": 0.0}, {"onset": 1.0})
+    forms = ({"onset": 0.0}, {"onset": 0.5}, {"onset": 1.0})
     empirical = True
     sentence = "the yaw rate has play: it depends on the direction in which its command changed"
     formula = (
-        "w' = min(max(w', w − play/2), w + play/2) while moving, or with onset = 1 w − sign(w) · play/2 in place of w"
+        "w' = min(max(w', w − play/2), w + play/2) while moving, or with onset >= 0.5 to each side by itself, "
+        "w − sign(w) · play · (onset − 0.5) in place of w"
     )
     source = "assumed: play of joystick or gear; 5-50 mrad/s"
     shows_in = Rate.W
@@ -38,13 +41,19 @@ class Backlash(Effect):
         """Drag w."""
         half = self.values["play"] / 2
         if self.values["onset"] >= 0.5:
-            left, self._left = _core.play(np.maximum(motion.w, 0.0) - half, half, self._left)
-            right, self._right = _core.play(np.maximum(-motion.w, 0.0) - half, half, self._right)
-            return replace(motion, w=left - right)
+            left, self._left = _core.play(self._side(motion.w), half, self._left)
+            right, self._right = _core.play(self._side(-motion.w), half, self._right)
+            return replace(motion, w=np.maximum(left, 0.0) - np.maximum(right, 0.0))
         w, self._level = _core.play(motion.w, half, self._level)
         return replace(motion, w=motion.moving * w)
 
+    def _side(self, w: FloatArray) -> FloatArray:
+        """Return what drags the rate (n,) to one side along: asked for nothing there, it lets go of it."""
+        shift = self.values["play"] * (self.values["onset"] - 0.5)
+        return np.where(w > 0, w - shift, -self.values["play"] / 2)
+
     def settle(self, motion: Motion) -> None:
         """Stand in the middle of the play."""
-        at, half = float(motion.w[-1]), self.values["play"] / 2
-        self._level, self._left, self._right = at, max(at - half, 0.0), max(-at - half, 0.0)
+        at = motion.w[-1:]
+        self._level = float(at[0])
+        self._left, self._right = float(self._side(at)[0]), float(self._side(-at)[0])

@@ -23,12 +23,13 @@ from kurumaisu.types import FloatArray, IntArray
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more
 LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, and its grid would fill the memory
-# [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
-# over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
-# variables), while over long ones it averages out.
 _ROLLS = 0.2  # [s] for which a chair may move on after it was asked to rest
 _ROUNDING = 1e-9  # [m/s], [rad/s]
 _USUAL_V, _USUAL_W = 0.8, 0.8  # [m/s], [rad/s]
+_GAP, _USUAL_STEPS = 0.5, 3.0  # [s], and steps of the reference: in what is longer, its headings may miss a turn
+# [s] least time between reference poses. Closer ones add cost, hardly information; and odometry is itself measured:
+# over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
+# variables), while over long ones it averages out.
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
 
 
@@ -138,7 +139,7 @@ def prepare(run: Run, model: Model, interval: float | None = None) -> Drive:
     if run.pose is None:
         raise Error(f"{run.name}: has no reference pose")
     source, times, v, w = _inputs(run, model)
-    pose_times, poses = _thin(run.pose, times[0], interval or POSE_INTERVAL[source])
+    pose_times, poses = _thin(_turned(run.pose, times, w), times[0], interval or POSE_INTERVAL[source])
     if len(pose_times) < 3:
         raise Error(
             f"{run.name}: has {len(pose_times)} reference poses after the first {source}; at least 3 are needed"
@@ -166,7 +167,7 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
     Raise Error when nothing says what drove the robot.
     """
     source, times, v, w = _inputs(run, model)
-    pose = run.pose or Series(np.empty(0), np.empty((0, 3)), ("x", "y", "theta"))
+    pose = _turned(run.pose or Series(np.empty(0), np.empty((0, 3)), ("x", "y", "theta")), times, w)
     use = pose.t >= times[0]
     first, last = min(times[0], *pose.t[use][:1], until), max([until, *pose.t[use][-1:]])
     if last - first > LONGEST:
@@ -252,6 +253,23 @@ def _from_odometry(odom: Series) -> tuple[FloatArray, FloatArray, FloatArray]:
     forward = np.cos(turn / 2) * steps[:, 0] + np.sin(turn / 2) * steps[:, 1]
     v, w = np.copysign(arc, forward) / dt, turn / dt
     return odom.t, np.append(v, 0.0), np.append(w, 0.0)
+
+
+def _turned(pose: Series, times: FloatArray, w: FloatArray) -> Series:
+    """Return poses that turn in gaps by as many whole turns as the yaw rates w (n,) from times (n,) on come nearest to.
+
+    In a gap a robot may turn by more than half a turn, of which the next heading says nothing.
+    """
+    steps = np.diff(pose.t)
+    gaps = (steps > _GAP) & (steps > _USUAL_STEPS * np.median(steps)) if len(steps) else np.zeros(0, dtype=bool)
+    if not gaps.any():
+        return pose
+    edges = np.append(times, max(times[-1], pose.t[-1]) + GRID)
+    asked = np.diff(np.interp(pose.t, edges, np.concatenate([[0.0], np.cumsum(w * np.diff(edges))])))
+    turns = np.rint((asked - np.diff(pose.values[:, 2])) / (2 * np.pi)) * gaps
+    values = pose.values.copy()
+    values[1:, 2] += 2 * np.pi * np.cumsum(turns)
+    return replace(pose, values=values)
 
 
 def _thin(pose: Series, since: float, interval: float) -> tuple[FloatArray, FloatArray]:

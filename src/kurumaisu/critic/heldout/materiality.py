@@ -17,7 +17,8 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
 MATERIAL = 0.005  # share of the way (or of the turn) from which an effect matters to a driver
-FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
+_FELT = 0.1  # share of what is uncertain anyway, per increment, from which an effect matters to a prediction
+_LEAST = 1e-4  # share of the way that must be moved for that: beside no noise at all anything would be felt
 _SAME = 1e-6  # [s] less than any clock resolves: stamps of equal spacing differ by rounding
 # [nat] of evidence from which _LIKELY will do, of effects and of a free curve
 _STRONG, STRONG_CURVE = 5.0, 8.0
@@ -57,6 +58,11 @@ def simulates_nearer(gain: Gain | None, channels: Sequence[str]) -> bool:
     errors = [gain.channels[name].rmse for name in channels if name in gain.channels]
     known = [error for error in errors if error is not None]
     return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
+
+
+def matters(share: float, felt: float) -> bool:
+    """Return whether an effect matters, by its share of the way and of the noise."""
+    return share >= MATERIAL or (felt >= _FELT and share >= _LEAST)
 
 
 def share_of_way(problem: Problem, settings: Sequence[EffectSetting], without: Sequence[EffectSetting]) -> float:

@@ -14,10 +14,9 @@ from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
-    FELT,
-    MATERIAL,
     NO_NOISE,
     confirmed,
+    matters,
     share_of_noise,
     share_of_way,
     simulates_nearer,
@@ -132,7 +131,7 @@ def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[b
     shares = shares_of(made, turning=turning)
     felt = {name: share_of_noise(problem, best.settings, without(best.settings, name)) for name in shares}
     felt = {name: 0.0 if shares[name] == EXPLAINED else size for name, size in felt.items()}
-    return held, shares, {name for name in shares if gains and (shares[name] >= MATERIAL or felt[name] >= FELT)}
+    return held, shares, {name for name in shares if gains and matters(shares[name], felt[name])}
 
 
 def _told_sets(found: SearchResult, matters: set[str]) -> tuple[tuple[str, ...], ...]:

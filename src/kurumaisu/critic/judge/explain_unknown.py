@@ -14,12 +14,12 @@ from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
 from kurumaisu.critic.heldout.materiality import (
-    FELT,
     HORIZON,
     MATERIAL,
     NO_NOISE,
     STRONG_CURVE,
     confirmed,
+    matters,
     share_of_noise,
     share_of_way,
     simulates_nearer,
@@ -58,7 +58,7 @@ def criticism(
     beside = explain.criticism(recording, replace(made, problem=curved, found=inner), gain, drives, proposal)
     share, felt = _shares(made)
     words = _sentences(extension, made.lead, share)
-    if not _confirmed(made, gain) or not _matters(share, felt):
+    if not _confirmed(made, gain) or not matters(share, felt):
         small = f"{words} It is too small to matter, or was not confirmed on held-out data."
         story = replace(beside.story, unexplained=(small, *beside.story.unexplained))
         kept = replace(beside, story=story, model=problem.model)
@@ -94,7 +94,7 @@ def _unconfirmed(kept: Criticism, problem: Problem, made: Decision, gain: Gain |
 def is_reported(made: Decision, gain: Gain | None) -> bool:
     """Tell whether a curve is told of: it matters, and held on data held out, or what it draws cannot be noise."""
     share, felt = _shares(made)
-    return (_confirmed(made, gain) and _matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
+    return (_confirmed(made, gain) and matters(share, felt)) or (_no_noise(made) and share >= MATERIAL)
 
 
 def _shares(made: Decision) -> tuple[float, float]:
@@ -103,10 +103,6 @@ def _shares(made: Decision) -> tuple[float, float]:
     assert extension is not None
     settings, without = extension.settings, extension.fit.settings
     return share_of_way(made.problem, settings, without), share_of_noise(made.problem, settings, without)
-
-
-def _matters(share: float, felt: float) -> bool:
-    return share >= MATERIAL or felt >= FELT
 
 
 def _confirmed(made: Decision, gain: Gain | None) -> bool:

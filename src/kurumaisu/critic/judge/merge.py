@@ -12,7 +12,13 @@ from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.verdict import Kind, Verdict
 
 _NOTHING_SAID = "none"
-_PLACES = {"hit x": "x of the walls", "hit y": "y of the walls"}
+_PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
+_PLACES |= {"x": "x of the laser", "y": "y of the laser"}
+_POSES = {  # each against where the reference puts it: it may be wrong itself
+    "reference.x": "the laser's x, or of the reference's",
+    "reference.y": "the laser's y, or of the reference's",
+    "reference.heading": "the laser's heading, or of the reference's",
+}
 
 
 def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
@@ -82,7 +88,8 @@ def headline(finding: LaserFinding) -> str:
     if finding.unknown:
         first = finding.unknown[0]
         over = _PLACES.get(first.covariate, first.covariate)
-        return f"No effect in the catalogue explains the error of the ranges. It follows the {over}: {first.shape}."
+        of = _POSES.get(first.channel, "the ranges")
+        return f"No effect in the catalogue explains the error of {of}. It follows the {over}: {first.shape}."
     if finding.causes:
         return named_causes(finding.causes)
     if finding.confounded:

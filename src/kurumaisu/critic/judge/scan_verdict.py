@@ -24,7 +24,14 @@ from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merge
 from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior, FormSearch
 from kurumaisu.critic.ranges.search.large_effect import large_effect
-from kurumaisu.critic.ranges.search.mean_effects import MeanEffects, gain_of, mean_effects, refitted, settled
+from kurumaisu.critic.ranges.search.mean_effects import (
+    MeanEffects,
+    gain_of,
+    mean_effects,
+    refitted,
+    settled,
+    with_doubt,
+)
 from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_rows
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
@@ -75,10 +82,10 @@ def criticise_scans(
         return _large_effect_first(question, assembly, normal, far)
     progress("laser: comparing effects")
     normal, found = _searched(assembly, normal, recording.truth)
-    made = mean_effects(assembly, normal, found)
+    normal, families = with_doubt(assembly, normal, found)
+    made = mean_effects(assembly, normal, found, families)
     if (wrong := another_map(made.winner, normal, float(assembly.map_change.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
-    made = made.without_spurious(assembly, normal)
     progress("laser: fitting the effects found")
     fit = refitted(assembly, normal, made, recording.truth)
     if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
@@ -108,12 +115,12 @@ def _searched(
 ) -> tuple[NormalEquations, FormPosterior]:
     """Return the normal equations and what acts by them, shapes refined between those of the grid."""
     found = FormSearch(assembly.forms, normal.gram).run()
-    if found.best.forms:
+    if any(form.at for form in found.best.forms):
         assembly.refine(found.best.forms, normal.beam_noise, normal.wary)
         shaped = [form for form in assembly.forms if form.start in {each.start for each in found.best.forms}]
         normal = assembly.settle(truth, shaped)
         found = FormSearch(assembly.forms, normal.gram).run()
-    return assembly.full(normal), found
+    return normal, found
 
 
 def _certain_lead(
@@ -195,7 +202,8 @@ def _finding(
         free = made.winner.free
         valid = normal.beam_noise.valid
         sizes[free.id] = size_of(assembly.columns[valid][:, free.span] @ made.coefficients)
-        settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
+        if free.pose is None:  # else whether the laser moves or the reference errs, the scans alone do not tell
+            settings[free.id], estimates[free.id] = of_block(made.winner, made.coefficients, normal)
     matters = {name for name, size in sizes.items() if size >= MATERIAL}
     settings = {name: setting for name, setting in settings.items() if name in matters}
     curve = made.winner is not None and made.curve and made.winner.free.id in matters

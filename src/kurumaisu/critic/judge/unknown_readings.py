@@ -14,13 +14,13 @@ from kurumaisu.critic.ranges.search.block_evidence import BlockComparison
 from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.shapes import grid, shape_of
-from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL, UNKNOWN_SCATTER
+from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import FloatArray
 
 _LISTED = 3
 # All others of RANGE_COVARIATES are angles.
-_UNITS = {"range": "m", "hit_x": "m", "hit_y": "m", "time": "s", "v": "m/s", "w": "rad/s"}
+_UNITS = dict.fromkeys(("range", "hit_x", "hit_y", "x", "y"), "m") | {"time": "s", "v": "m/s", "w": "rad/s"}
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
         p = min(weighed.p[rival.free.id], 1.0)
         _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
         curve = ReadingCurve(basis, 1e3 * coefficients, 1e6 * covariance)
-        yield Unknown(UNKNOWN_CHANNEL, _called(basis), shape(curve, "mm"), p)
+        channel, unit = (UNKNOWN_CHANNEL, "mm") if rival.free.pose is None else UNKNOWN_POSE[rival.free.pose]
+        yield Unknown(channel, _called(basis), shape(curve, unit), p)
 
 
 def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:

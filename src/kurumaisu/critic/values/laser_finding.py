@@ -11,6 +11,8 @@ from kurumaisu.params import EffectSetting
 
 UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue, of the mean of readings
 UNKNOWN_SCATTER = "laser.scatter"  # and of how they scatter
+# Of x, y and heading of where scans put the laser, against the reference, with the unit of a thousandth.
+UNKNOWN_POSE = (("reference.x", "mm"), ("reference.y", "mm"), ("reference.heading", "mrad"))
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,16 @@ from scipy.linalg import block_diag
 from scipy.special import logsumexp
 
 from kurumaisu import effects
+from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
 from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS, odds
 from kurumaisu.types import FloatArray, IntArray
 
-BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue
+BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue, where nothing may act at all
+CERTAIN = 12.0  # [nat] over nothing, from which something acts
 LEFT = 0.05  # share of a curve's evidence that the curve itself may leave to other effects
 _FITS = 10  # best sets beside which blocks are tried
 _SINGLES = 12  # best single effects likewise
@@ -26,6 +29,8 @@ _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _NEAR = 30.0  # [nat] behind the likeliest, beyond which nobody asks what a curve draws
 _ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
+
+Families = Mapping[str, tuple[slice, FormFamily]]  # by effect: what its equation may miss, and where its columns are
 
 
 @dataclass(frozen=True)
@@ -67,10 +72,17 @@ class BlockComparison:
 
     @property
     def least(self) -> float:
-        """Lead that a curve needs [nat]: an effect of the catalogue of a slightly other form leaves some, too."""
+        """Lead that a curve needs [nat]: none where something acts for sure."""
         nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
         curve = next((rival.log_posterior for rival in self.rivals if rival.unknown), nothing)
-        return max(BEYOND, LEFT * (curve - nothing))
+        return BEYOND if curve - nothing < CERTAIN else 0.0
+
+    @property
+    def fit(self) -> FittedForms:
+        """The effects that act where no block does: of which one may have another form, which a curve drew."""
+        drawn = next((rival for rival in self.rivals if rival.form_of in rival.fit.ids), None)
+        best = self.found.best
+        return best if drawn is None or drawn.log_posterior <= best.score else drawn.fit
 
     @property
     def winner(self) -> SetWithBlock | None:
@@ -92,18 +104,28 @@ class BlockComparison:
         return max(same, key=lambda rival: rival.log_posterior - least * len(rival.fit.ids))
 
 
-def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray) -> BlockComparison:
-    """Try every block beside the best sets, beside single effects, and beside none."""
+def compare_blocks(
+    found: FormPosterior, free: Sequence[Block], gram: FloatArray, families: Families
+) -> BlockComparison:
+    """Try every block beside the best sets, beside single effects, and beside none.
+
+    families: what equations may miss, whose columns are in the gram, too.
+    """
+    doubted = _Doubted(gram, families)
+    tried = [doubted.fit(fit) for fit in _tried(found.fits)]
+    other = [fit for fit in found.fits if all(fit.forms != one.forms for one in tried)]
+    found = replace(found, fits=tuple(sorted([*tried, *other], key=lambda fit: -fit.score)))
     ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
     count = len(ids)
     curves = sum(each.basis is not None for each in free)
     shares = {e.id: float(np.log(odds(count) if e.basis is None else UNKNOWN_ODDS / curves)) for e in free}
     known = {fit.ids: fit for fit in reversed(found.fits)}
     rivals = []
-    for fit in _tried(found.fits):
-        rivals += [_with_block(fit, each, gram, shares[each.id]) for each in free if each.id not in fit.ids]
+    for fit in tried:
+        own = doubted.gram(fit)
+        rivals += [_with_block(fit, each, own, shares[each.id]) for each in free if each.id not in fit.ids]
     rivals.sort(key=lambda rival: -rival.log_posterior)
-    rivals = [*_pruned(rivals[:_PRUNED], known, gram, shares), *rivals]
+    rivals = [*_pruned(rivals[:_PRUNED], known, doubted, shares), *rivals]
     rivals.sort(key=lambda rival: -rival.log_posterior)
     singles = [fit for fit in found.fits if len(fit.forms) == 1 and effects.by_id(fit.forms[0].id).empirical]
     near = rivals[0].log_posterior - _NEAR if rivals else 0.0
@@ -129,6 +151,65 @@ def compare_blocks(found: FormPosterior, free: Sequence[Block], gram: FloatArray
     return replace(made, found=replace(found, p=p, confounded=confounded))
 
 
+class _Doubted:
+    """Sets with what the equations of their effects may miss, as a part of the noise, by one gram."""
+
+    def __init__(self, gram: FloatArray, families: Families) -> None:
+        self._gram, self._families = gram, families
+        self._known: dict[tuple[int, ...], tuple[FittedForms, FloatArray]] = {}
+
+    def fit(self, fit: FittedForms) -> FittedForms:
+        """Return a fit with the evidence that it has then; of which share of a signal is missed, each is as likely."""
+        return self._made(fit)[0]
+
+    def gram(self, fit: FittedForms) -> FloatArray:
+        """Return the normal equations in the likeliest of these noises."""
+        return self._made(fit)[1]
+
+    def _made(self, fit: FittedForms) -> tuple[FittedForms, FloatArray]:
+        key = tuple(form.start for form in fit.forms)
+        if key not in self._known:
+            self._known[key] = self._weighed(fit)
+        return self._known[key]
+
+    def _weighed(self, fit: FittedForms) -> tuple[FittedForms, FloatArray]:
+        drawn, start = [], 0
+        for form in fit.forms:
+            size = fit.coefficients[start : start + len(form.columns)]
+            start += len(form.columns)
+            if form.id in self._families:
+                drawn.append((*self._families[form.id], float(size @ self._gram[form.span, form.span] @ size)))
+        if not drawn:
+            return fit, self._gram
+        free = np.concatenate([np.arange(span.start, span.stop) for span, _, _ in drawn])
+        use = np.concatenate([_use(fit), free, [len(self._gram) - 1]])
+        some, own = self._gram[np.ix_(use, use)], np.arange(len(use) - 1 - len(free), len(use) - 1)
+
+        def prior(shares: tuple[float, float]) -> FloatArray:
+            each = (family.scaled(self._gram[span, span], power, *shares) for span, family, power in drawn)
+            return np.asarray(block_diag(*each))
+
+        nats: dict[tuple[float, float], float] = {(0.0, 0.0): _marginal(some, own, prior((0.0, 0.0)))}
+        for i in range(2):  # one after the other: of all pairs of shares, these hold nearly all that is likely
+            best = max(nats, key=lambda shares: nats[shares])
+            for share in SHARES:
+                shares = (share, best[1]) if i == 0 else (best[0], share)
+                nats[shares] = _marginal(some, own, prior(shares))
+        best = max(nats, key=lambda shares: nats[shares])
+        more = float(logsumexp(list(nats.values()))) - nats[0.0, 0.0] - 2 * float(np.log(1 + len(SHARES)))
+        made = self._gram if best == (0.0, 0.0) else integrated_out(self._gram, free, prior(best))
+        return replace(fit, score=fit.score + more, log_likelihood=fit.log_likelihood + more), made
+
+
+def _marginal(gram: FloatArray, own: IntArray, prior: FloatArray) -> float:
+    """Return the log evidence [nat], but for a constant, of columns fitted beside own ones, normal with a prior."""
+    inner = np.eye(len(own)) + gram[np.ix_(own, own)] @ prior
+    rest = integrated_out(gram, own, prior)
+    fixed = np.setdiff1d(np.arange(len(gram) - 1), own)
+    a, b = rest[np.ix_(fixed, fixed)] + WEAK_PRIOR * np.eye(len(fixed)), rest[fixed, -1]
+    return 0.5 * float(b @ np.linalg.solve(a, b) - rest[-1, -1] - np.linalg.slogdet(inner)[1])
+
+
 def _with_block(fit: FittedForms, free: Block, gram: FloatArray, share: float) -> SetWithBlock:
     seen = curve_evidence(*without_own_span(fit, free, gram), free.priors)
     # Walls that are each where they like have no equation that could be wrong by a share; curves have few knots.
@@ -140,7 +221,7 @@ def _with_block(fit: FittedForms, free: Block, gram: FloatArray, share: float) -
 def _pruned(
     rivals: Sequence[SetWithBlock],
     known: Mapping[frozenset[str], FittedForms],
-    gram: FloatArray,
+    doubted: _Doubted,
     shares: Mapping[str, float],
 ) -> Iterator[SetWithBlock]:
     """Yield the rivals with as few effects beside the block as are worth it."""
@@ -149,9 +230,9 @@ def _pruned(
         best = rival
         while True:
             fewer = [best.fit.ids - {name} for name in best.fit.ids]
-            fits = [known[ids] for ids in fewer if ids in known and (ids, best.free.id) not in done]
+            fits = [doubted.fit(known[ids]) for ids in fewer if ids in known and (ids, best.free.id) not in done]
             done |= {(fit.ids, best.free.id) for fit in fits}
-            tried = [_with_block(fit, best.free, gram, shares[best.free.id]) for fit in fits]
+            tried = [_with_block(fit, best.free, doubted.gram(fit), shares[best.free.id]) for fit in fits]
             yield from tried
             top = max(tried, key=lambda each: each.log_posterior, default=best)
             if top.log_posterior <= best.log_posterior:
@@ -183,6 +264,8 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
     """
     if rival.free.basis is None or rival.evidence.nats <= 0:
         return None
+    if rival.free.pose is not None and (name := _grown(rival, gram)) is not None:
+        return name
     drawn, own = fit_with_block(rival, gram)[1], np.arange(rival.free.span.start, rival.free.span.stop)
     alike = []
     for fit in singles:
@@ -196,6 +279,20 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
         alike.append((float(across / np.sqrt(one * other)) if min(one, other) > 0 else 0.0, form.id))
     nearest, name = max(alike, default=(0.0, ""))
     return name if nearest >= _ALIKE else None
+
+
+def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:
+    """Return the effect beside a curve that does what the curve does where it is one everywhere: its size varies."""
+    start = 0
+    one = gram[rival.free.span, rival.free.span].sum()
+    for form in rival.fit.forms:
+        size = rival.fit.coefficients[start : start + len(form.columns)]
+        start += len(form.columns)
+        across = float(gram[rival.free.span, form.span].sum(axis=0) @ size)
+        own = float(size @ gram[form.span, form.span] @ size)
+        if abs(across) >= _ALIKE * np.sqrt(one * own):
+            return form.id
+    return None
 
 
 def block_size(rival: SetWithBlock, gram: FloatArray) -> tuple[float, float, float]:

@@ -15,13 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from kurumaisu import effects
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, FormSearch
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
 from kurumaisu.types import FloatArray
 
 
@@ -67,7 +66,7 @@ def further_effects(
     beams = refitted.normal.beam_noise
     beams = replace(beams, valid=beams.valid & normal.beam_noise.valid)
     refitted = replace(refitted, normal=replace(normal, beam_noise=beams))
-    curves = _curves(assembly, fit, refitted, others)
+    curves = _curves(assembly, fit, others)
     gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)
     starts = np.cumsum([0, *(len(form.columns) for form in rest)])
     moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
@@ -95,23 +94,15 @@ def _unasked(fit: FittedForms) -> float:
 
 
 def _curves(
-    assembly: Assembly, fit: FittedForms, refitted: ParameterFit, others: Mapping[str, FormFamily]
+    assembly: Assembly, fit: FittedForms, others: Mapping[str, FormFamily]
 ) -> list[tuple[FormFamily, FloatArray]]:
-    """Return the curves that effects on readings may follow instead, and what these do (k, b) [m].
-
-    Also of those whose equation is no family's simplest: a mirror may have overtones, an offset may drift.
-    """
+    """Return the curves that effects of a fit may follow instead, and what these effects do (k, b) [m]."""
     out, start = [], 0
-    shots, seen, valid = refitted.assembly.shots, refitted.assembly.marks.seen, refitted.normal.beam_noise.valid
     for form in fit.forms:
         own = slice(start, start + len(form.columns))
         start = own.stop
-        change = assembly.columns[:, :, form.span] @ fit.coefficients[own]
         if form.id in others:
-            out.append((others[form.id], change))
-        elif issubclass(effects.by_id(form.id), effects.ReadingEffect):
-            curve = form_family(change, shots, seen, valid)
-            out += [(curve, change)] if curve is not None else []
+            out.append((others[form.id], assembly.columns[:, :, form.span] @ fit.coefficients[own]))
     return out
 
 

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, Families, SetWithBlock
 from kurumaisu.critic.ranges.search.dominant_effect import vanished_effects
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
 from kurumaisu.critic.ranges.search.effect_settings import settings_of
@@ -17,9 +18,10 @@ from kurumaisu.critic.ranges.search.further_effects import FurtherEffects, furth
 from kurumaisu.critic.ranges.search.misfits import Part
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
-from kurumaisu.critic.ranges.search.spurious_effects import form_families, without_spurious
-from kurumaisu.critic.ranges.signals.form_error import FormFamily
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family
 from kurumaisu.types import FloatArray
+
+_SETS, _DOUBTED = 60, 8  # likeliest sets, and effects of theirs, whose equations are doubted
 
 
 @dataclass(frozen=True)
@@ -52,23 +54,10 @@ class MeanEffects:
         """Whether a curve acts, which is in no catalogue."""
         return self.winner is not None and self.winner.free.basis is not None
 
-    def without_spurious(self, assembly: Assembly, normal: NormalEquations) -> MeanEffects:
-        """Return the same without effects that others of another form explain; of a curve, which is unlike any, all."""
-        made = replace(self, others=form_families(assembly, normal, self.fit))
-        if self.curve:
-            return made
-        fit, winner = without_spurious(assembly, normal, self.found, (self.fit, self.winner), made.others)
-        if fit is self.fit and winner is self.winner:
-            return made
-        if winner is None:
-            return replace(made, fit=fit, winner=None, coefficients=np.empty(0), covariance=np.empty((0, 0)))
-        fit, winner, coefficients, covariance = _fit_with_block(winner, normal)
-        return replace(made, fit=fit, winner=winner, coefficients=coefficients, covariance=covariance)
-
     def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
         """Return the same with what acts beside it."""
         fit = more.added_to(self.fit)
-        return replace(self, fit=fit, others=form_families(assembly, normal, fit), more=more)
+        return replace(self, fit=fit, others=form_families(assembly, normal, [fit]), more=more)
 
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
@@ -80,20 +69,50 @@ class MeanEffects:
         return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
 
-def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosterior) -> MeanEffects:
-    """Return what acts by a search, with blocks in the running."""
-    weighed = block_evidence.compare_blocks(found, assembly.free, normal.gram)
+def form_families(
+    assembly: Assembly, normal: NormalEquations, fits: Sequence[FittedForms], most: int | None = None
+) -> dict[str, FormFamily]:
+    """Return what the equations of the effects of some fits may miss, of the first ones if these are many.
+
+    Of those on readings: geometry has one form, and what moves a laser on the robot is sought as curves of its pose.
+    """
+    out: dict[str, FormFamily] = {}
+    for fit in fits:
+        start = 0
+        for form in fit.forms:
+            stop = start + len(form.columns)
+            if form.id not in out and _on_readings(form.id) and (most is None or len(out) < most):
+                change = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
+                found = form_family(change, assembly.shots, assembly.marks.seen, normal.beam_noise.valid)
+                if found is not None:
+                    out[form.id] = found
+            start = stop
+    return out
+
+
+def _on_readings(name: str) -> bool:
+    return issubclass(effects.by_id(name), effects.ReadingEffect)
+
+
+def with_doubt(assembly: Assembly, normal: NormalEquations, found: FormPosterior) -> tuple[NormalEquations, Families]:
+    """Return the normal equations of all columns, and last of what the equations of the likeliest effects may miss."""
+    families = form_families(assembly, normal, found.fits[:_SETS], _DOUBTED)
+    spans, start = {}, assembly.columns.shape[2]
+    for name, family in families.items():
+        spans[name] = slice(start, start + family.size), family
+        start += family.size
+    return assembly.with_families(list(families.values())).full(normal), spans
+
+
+def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosterior, families: Families) -> MeanEffects:
+    """Return what acts by a search, with blocks in the running; families: what equations may miss, by effect."""
+    weighed = block_evidence.compare_blocks(found, assembly.free, normal.gram, families)
     winner = weighed.winner
     if winner is None:
-        return MeanEffects(weighed, found.best, None, np.empty(0), np.empty((0, 0)))
-    return MeanEffects(weighed, *_fit_with_block(winner, normal))
-
-
-def _fit_with_block(
-    winner: SetWithBlock, normal: NormalEquations
-) -> tuple[FittedForms, SetWithBlock, FloatArray, FloatArray]:
+        others = form_families(assembly, normal, [weighed.fit])
+        return MeanEffects(weighed, weighed.fit, None, np.empty(0), np.empty((0, 0)), others)
     fit, coefficients, covariance = block_evidence.fit_with_block(winner, normal.gram)
-    return fit, winner, coefficients, covariance
+    return MeanEffects(weighed, fit, winner, coefficients, covariance, form_families(assembly, normal, [fit]))
 
 
 def refitted(

@@ -97,7 +97,7 @@ class Assembly:
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = usable_beams(self.shots, self.marks.seen, self.marks.base) & self.mapped
         self.forms, fixed = self.marks.forms(ids)
-        self.free, more = blocks(self.shots, self.marks, fixed.shape[2], ids)
+        self.free, more = blocks(self.shots, self.marks, self.poses, fixed.shape[2], ids)
         self.columns = np.concatenate([fixed, more], axis=2)
         # A beam that meets nothing with one of the effects at work says nothing about it.
         self.first = replace(self.first, valid=self.first.valid & np.isfinite(self.columns).all(axis=2))

@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from kurumaisu import effects
 from kurumaisu.critic.ranges.noise.level_jumps import knots_parted, level_jumps
 from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
-from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
+from kurumaisu.critic.ranges.scans.beams import RATES, BeamHits, Shots
 from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.critic.ranges.signals.effect_columns import STEP, EffectColumns
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
-from kurumaisu.types import FloatArray
+from kurumaisu.geometry import wrap
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
-_HATS = 14
+_HATS, _POSE_HATS = 14, 8  # of curves of the readings, and of the laser's pose
 _PAUSE = 5.0  # [s] between scans, which makes two stops of what was one
 _STOPS = 20  # stops of which each may have a knot of its own
 _DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
@@ -38,7 +39,8 @@ class Block:
     """A block of columns whose coefficients are normal before the data, with covariances `priors`, to a factor.
 
     id: of the effect; parameter: the sd of the coefficients, in units of its scale, None of a curve; basis: of the
-    curve, None of an effect of the catalogue; whole: it changes all readings of a scan alike.
+    curve, None of an effect of the catalogue; whole: it changes all readings of a scan alike; pose: which of x, y and
+    heading of the laser a curve is an error of, against the reference, None of one of the readings.
     """
 
     id: str
@@ -47,6 +49,7 @@ class Block:
     priors: tuple[FloatArray, ...]
     span: slice
     whole: bool = False
+    pose: int | None = None
 
 
 class _Spike(np.random.Generator):
@@ -66,15 +69,18 @@ class _Spike(np.random.Generator):
 
 
 def blocks(
-    shots: Shots, marks: EffectColumns, start: int, ids: frozenset[str] | None
+    shots: Shots, marks: EffectColumns, poses: FloatArray, start: int, ids: frozenset[str] | None
 ) -> tuple[list[Block], FloatArray]:
     """Return all blocks, those first that change whole scans, and their columns (k, b, m).
 
-    start: index of the first one in the whole matrix.
+    poses (k, b, 3): change of the readings per metre and radian of a pose; start: index of the first one in the whole
+    matrix.
     """
     found: list[Block] = []
     columns: list[NDArray[np.float32]] = []
-    parts = [*_drawn(shots, marks, ids), *(_curves(shots, marks) if ids is None or effects.SMOOTH in ids else ())]
+    parts = list(_drawn(shots, marks, ids))
+    if ids is None or effects.SMOOTH in ids:
+        parts += [*_curves(shots, marks), *_pose_curves(shots, marks, poses)]
     for free, part in sorted(parts, key=lambda each: not each[0].whole):
         found.append(replace(free, span=slice(start, start + part.shape[2])))
         columns.append(part.astype(np.float32))
@@ -129,21 +135,55 @@ def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatAr
     stand = stands_of(shots)
     jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
     for name, at in covariates(shots, marks.seen).items():
-        values = at[known]
-        if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in shots.known else _LEAST):
-            continue
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
-        knots = _knots(at[:, 0] if whole else values[:: max(len(values) // _SAMPLES, 1)])
-        if len(knots) < 3:
-            continue
-        knots, places = knots_parted(knots, at[:, 0], stand, jumped) if whole else (knots, knots)
-        few = values[:: max(len(values) // _SAMPLES, 1)]
-        matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
-        low, high = np.quantile(few, [0.025, 0.975])
-        priors = tuple(priors_of(places, matrix))
-        basis = Basis(name, knots, {}, priors, float(low), float(high))
-        columns = basis.matrix(at.ravel()).reshape(*at.shape, len(knots))
-        yield Block(effects.smooth_range_id(name), None, basis, priors, slice(0), whole), columns
+        basis = _basis(name, at, known, shots, (stand, jumped) if whole else None)
+        if basis is not None:
+            columns = basis.matrix(at.ravel()).reshape(*at.shape, len(basis.knots))
+            yield Block(effects.smooth_range_id(name), None, basis, basis.priors, slice(0), whole), columns
+
+
+def _pose_curves(shots: Shots, marks: EffectColumns, poses: FloatArray) -> Iterator[tuple[Block, FloatArray]]:
+    """Yield what a laser that is not where the reference says may follow: its heading, or its place in the map.
+
+    The reference may err, or the laser may move on the robot: the scans alone do not tell.
+    """
+    known, origins = np.isfinite(marks.base), marks.seen.origins
+    follow = {"heading": wrap(origins[..., 2]), "x": origins[..., 0], "y": origins[..., 1]}
+    rates = {name: np.repeat(shots.known[name][:, np.newaxis], shots.laser.beams, axis=1) for name in RATES}
+    for axis, which in enumerate((("x", "y"), ("x", "y"), (*RATES, "heading", "x", "y"))):
+        for name in which:
+            at = {**follow, **rates}[name]
+            basis = _basis(name, at, known, shots, None, _POSE_HATS)
+            if basis is not None:
+                columns = basis.matrix(at.ravel()).reshape(*at.shape, len(basis.knots)) * poses[:, :, axis, np.newaxis]
+                # A reference that wanders is an error of its own: only what is faster than that is none of its noise.
+                made = Block(f"pose.{axis}.{name}", None, basis, basis.priors, slice(0), name in RATES, axis)
+                yield made, columns
+
+
+def _basis(
+    name: str,
+    at: FloatArray,
+    known: BoolArray,
+    shots: Shots,
+    stands: tuple[IntArray, IntArray] | None,
+    hats: int = _HATS,
+) -> Basis | None:
+    """Return the curves over a quantity at (k, b) of the beams, None where it hardly varies.
+
+    stands: which stand each scan is of, and where its level jumps, of a quantity that is one for a whole scan.
+    """
+    values = at[known]
+    if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in shots.known else _LEAST):
+        return None
+    few = values[:: max(len(values) // _SAMPLES, 1)]
+    knots = _knots(few if stands is None else at[:, 0], hats)
+    if len(knots) < 3:
+        return None
+    knots, places = (knots, knots) if stands is None else knots_parted(knots, at[:, 0], *stands)
+    matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
+    low, high = np.quantile(few, [0.025, 0.975])
+    return Basis(name, knots, {}, tuple(priors_of(places, matrix)), float(low), float(high))
 
 
 def covariates(shots: Shots, seen: BeamHits) -> dict[str, FloatArray]:
@@ -161,11 +201,11 @@ def echoes_of(shots: Shots, seen: BeamHits) -> Echoes:
     return Echoes(shots.stamps[:, np.newaxis], bearings, *parts)
 
 
-def _knots(values: FloatArray) -> FloatArray:
+def _knots(values: FloatArray, hats: int) -> FloatArray:
     """Return knots of a curve: one for each value where there are few, as of stops."""
     ordered = np.sort(values)
     gaps = np.flatnonzero(np.diff(ordered) > 0.02 * max(float(np.ptp(ordered)), 1e-9))
     groups = np.split(ordered, gaps + 1)
     if 3 <= len(groups) <= _STOPS and sum(float(np.ptp(group)) for group in groups) < 0.1 * float(np.ptp(ordered)):
         return np.array([group.mean() for group in groups])
-    return knots_of(values, _HATS)
+    return knots_of(values, hats)

@@ -11,16 +11,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.signals.coefficient_blocks import echoes_of
-from kurumaisu.critic.unknown.bases import Basis, priors_of
+from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FOLLOWED = ("time", "range", "incidence", "bearing")
 _RETURNS = "returns"
+_SMOOTH = 5  # knots of a smooth function
 _HATS = 16  # of a curve, as many as of one that is in no catalogue, and two more
 _FINE = 64  # knots that draw whatever is a curve at all
 _DRAWN = 0.01  # share of an effect's power that such a curve may leave
@@ -29,36 +31,64 @@ _MOST = 12  # reflectances that a map may have, for a step each
 
 
 @dataclass(frozen=True)
-class FormFamily:
-    """Curves that an effect may follow instead of its equation.
+class DrawnCurve:
+    """A curve that an effect may follow: over a covariate, straight lines between knots, or a step for each value.
 
-    covariate: what they follow; knots: of straight lines, or values with a step each where there are but few; prior
-    (n, n): covariance of the coefficients, to a factor.
+    prior (n, n): covariance of its coefficients, to a factor; signal (k, b) [m]: what the effect does, which
+    the curve multiplies, None of one that stands for the effect itself.
     """
 
     covariate: str
     knots: FloatArray
     prior: FloatArray
+    signal: FloatArray | None = None
 
     def columns(self, shots: Shots, seen: BeamHits) -> FloatArray:
-        """Return the curves (k, b, n) over the beams."""
+        """Return the curve's columns (k, b, n) over the beams."""
         values = _values(self.covariate, shots, seen)
         if self.covariate == _RETURNS:
             return _steps(self.knots, values)
-        return _hats(self.knots, values.ravel()).reshape(*values.shape, len(self.knots))
+        hats = _hats(self.knots, values.ravel()).reshape(*values.shape, len(self.knots))
+        return hats if self.signal is None else hats * self.signal[:, :, np.newaxis]
 
-    def scaled(self, gram: FloatArray, power: float) -> FloatArray:
-        """Return the prior (n, n) with which curves are as large, for their gram (n, n), as a form's share of `power`.
 
-        power: squared norm, whitened as the gram is, of what the effect does.
+@dataclass(frozen=True)
+class FormFamily:
+    """Curves that an effect may follow instead of its equation."""
+
+    curves: tuple[DrawnCurve, ...]
+
+    @property
+    def size(self) -> int:
+        """Return the number of coefficients."""
+        return sum(len(curve.prior) for curve in self.curves)
+
+    def columns(self, shots: Shots, seen: BeamHits) -> FloatArray:
+        """Return the curves (k, b, n) over the beams."""
+        return np.concatenate([curve.columns(shots, seen) for curve in self.curves], axis=2)
+
+    def scaled(
+        self, gram: FloatArray, power: float, share: float = FORM_ERROR, times: float | None = None
+    ) -> FloatArray:
+        """Return the prior (n, n) with which each curve is as large, for their gram (n, n), as a share of `power`.
+
+        power: squared norm, whitened as the gram is, of what the effect does; times: the share of curves that multiply
+        it, None for the same.
         """
-        return self.prior * (FORM_ERROR**2 * power / max(float(np.sum(self.prior * gram)), 1e-300))
+        priors, start = [], 0
+        for curve in self.curves:
+            own = slice(start, start + len(curve.prior))
+            start = own.stop
+            size = share if curve.signal is None or times is None else times
+            priors.append(curve.prior * (size**2 * power / max(float(np.sum(curve.prior * gram[own, own])), 1e-300)))
+        return np.asarray(block_diag(*priors))
 
 
 def form_family(change: FloatArray, shots: Shots, seen: BeamHits, valid: BoolArray) -> FormFamily | None:
-    """Return the curves over what an effect follows that does this (k, b) [m] to the mean; None if it follows nothing.
+    """Return the curves that what an effect does (k, b) [m] to the mean may follow instead; None if it does nothing.
 
-    Of two quantities that draw it, the one that leaves less; valid (k, b): of which readings it must.
+    One over the quantity that draws it, if any does, of two the one that leaves less; and what it does times smooth
+    functions of others. valid (k, b): of which readings that must hold.
     """
     known = valid & np.isfinite(change)
     step = max(int(known.sum()) // _SAMPLES, 1)
@@ -75,13 +105,20 @@ def form_family(change: FloatArray, shots: Shots, seen: BeamHits, valid: BoolArr
         left = _left(_steps(fine, values) if name == _RETURNS else _hats(fine, values), target)
         if left < least:
             best, least = name, left
-    return None if best is None else _over(best, _values(best, shots, seen)[known][::step], target)
+    drawn = () if best is None else (_over(best, _values(best, shots, seen)[known][::step], target),)
+    there = np.where(known, change, 0.0)
+    more = []
+    for name in _FOLLOWED:
+        knots = knots_of(_values(name, shots, seen)[known][::step], _SMOOTH)
+        if name != best and len(knots) > 1:
+            more.append(DrawnCurve(name, knots, np.eye(len(knots)), there))
+    return FormFamily((*drawn, *more)) if drawn or more else None
 
 
 def beam_family(shots: Shots) -> FormFamily:
     """Return curves over the bearing: what single beams keep, be it as smooth as it may."""
     ends = shots.laser.bearings[[0, -1]]
-    return FormFamily("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS))
+    return FormFamily((DrawnCurve("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS)),))
 
 
 def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
@@ -93,11 +130,11 @@ def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> Fl
     return np.asarray(gram - cross.T @ np.linalg.solve(inner, cross))
 
 
-def _over(name: str, values: FloatArray, change: FloatArray) -> FormFamily:
+def _over(name: str, values: FloatArray, change: FloatArray) -> DrawnCurve:
     """Return curves over a quantity; change [m]: what the effect does there. Other forms bend where it does, too."""
     if name == _RETURNS:
         steps = np.unique(values)
-        return FormFamily(name, steps, np.eye(len(steps)))
+        return DrawnCurve(name, steps, np.eye(len(steps)))
     fine = _knots(values, _FINE)
     drawn = _fitted(_hats(fine, values), change)
     ways = (fine, np.searchsorted(np.sort(values), fine), np.cumsum(np.abs(np.diff(drawn, prepend=drawn[:1]))))
@@ -105,7 +142,7 @@ def _over(name: str, values: FloatArray, change: FloatArray) -> FormFamily:
     knots = np.interp(np.linspace(0.0, along[-1], _HATS), along, fine)
     # Rough or smooth along these, with a level of its own or without: nobody knows.
     every = priors_of(np.arange(_HATS, dtype=float), _hats(knots, values))
-    return FormFamily(name, knots, np.mean(list(every), axis=0))
+    return DrawnCurve(name, knots, np.mean(list(every), axis=0))
 
 
 def _values(name: str, shots: Shots, seen: BeamHits) -> FloatArray:
