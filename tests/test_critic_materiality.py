@@ -3,7 +3,7 @@
 
 import pytest
 
-from kurumaisu.critic.heldout.materiality import confirmed
+from kurumaisu.critic.heldout.materiality import confirmed, matters
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 
 
@@ -31,3 +31,11 @@ def test_the_more_evidence_the_less_has_a_short_drive_to_gain(gain, nats, free, 
 
 def test_without_data_held_out_nothing_is_confirmed():
     assert not confirmed(None, 1000.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "felt", "expected"),
+    [(0.01, 0.0, True), (0.001, 0.2, True), (0.001, 0.05, False), (1e-5, 100.0, False)],
+)
+def test_what_moves_nothing_does_not_matter_beside_no_noise(share, felt, expected):
+    assert matters(share, felt) == expected
