@@ -2,6 +2,6 @@
 """Robots made by people who have seen neither the critic nor the simulator: recordings with something hidden.
 
 Each package has make(folder, kind, seed), which writes recording/, truth.json and answers.csv. cliff, dune and motors,
-which is physics, are to develop on, heath to report on: once the cases of one have been looked at, the next report needs
-another.
+which is physics, are to develop on, heath to report on: once the cases of one have been looked at, the next report
+needs another.
 """
