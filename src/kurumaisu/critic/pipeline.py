@@ -12,6 +12,7 @@ from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.heldout.extension_gain import with_gains
 from kurumaisu.critic.judge import explain
+from kurumaisu.critic.judge.clock_drift import by_its_clock, drifts
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import with_scans
@@ -68,7 +69,10 @@ def criticise(
     def again(moved: Recording) -> LaserFinding:
         return criticise_scans(moved, model, progress, ids)
 
-    scans, settings = from_base_link(found.verdict.causes, scans, recording, model, again)
+    seen, stamped = by_its_clock(found.verdict.causes, scans, recording, model, again)
+    drifting = scans.settings if seen is not scans else ()
+    scans, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
+    settings = (*settings, *(one for one in drifting if drifts(one.id)))
     found = with_scans(found, scans)
     found = with_gains(found, whole, replace(extension, scans=settings), progress, slam=slam)
     found = with_robot(found, recording)

@@ -1,22 +1,31 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""A clock that runs fast or slow, nobody knows from when on: if it agreed later than at 0, a delay is a part of it."""
+"""A clock that runs fast or slow is one fault: neither a delay besides, nor the laser's if it is the reference's.
+
+Nobody knows from when on it does: if clocks agreed later than at 0, a delay is a part of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.verdict import Cause
-from kurumaisu.effects import BeamEffect, Beams
+from kurumaisu.effects import BeamEffect, Beams, Context, Reference, ReferenceEffect
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 _NEAR = 5.0  # [s] of the first scan: so long before or after it a recording may have begun
 _SURE = 1.8  # times half of a 90 % interval: three standard deviations
 _LATER = 1000.0  # [s] at which a clock's drift is looked at
 _NONE = 1e-9  # [s] a shift that is none
+
+Look = Callable[[Recording], LaserFinding]
+_Times = Callable[[FloatArray, float], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -49,6 +58,16 @@ def without_double_delay(finding: LaserFinding, stamps: FloatArray) -> LaserFind
     return replace(finding, causes=tuple(c for c in finding.causes if c.id != late), details=(*finding.details, told))
 
 
+def drifts(name: str) -> bool:
+    """Return whether an effect of a usual size lets the time of a scan drift."""
+    effect = effects.by_id(name)
+    if not issubclass(effect, BeamEffect):
+        return False
+    usual = effect({p.name: p.null + p.scale for p in effect.parameters}, np.random.default_rng(0))
+    early, late = (float(usual.apply(Beams.single(stamp)).times[0]) - stamp for stamp in (0.0, _LATER))
+    return abs(late - early) > _NONE
+
+
 def _clock(cause: Cause) -> _Clock | None:
     """Return what a cause does to the time of a whole scan; None if that is nothing."""
     effect = effects.by_id(cause.id)
@@ -63,3 +82,55 @@ def _clock(cause: Cause) -> _Clock | None:
     at, growth = shift(0.0), (shift(_LATER) - shift(0.0)) / _LATER
     half = abs(shift(0.0, "hi90") - shift(0.0, "lo90")) / 2
     return _Clock(at, growth, half) if max(abs(at), abs(growth) * _LATER) > _NONE else None
+
+
+def by_its_clock(
+    causes: Sequence[Cause], finding: LaserFinding, recording: Recording, model: Model, look: Look
+) -> tuple[LaserFinding, Recording]:
+    """Return what the scans say of a recording whose reference is stamped by the commands' clock, and that recording.
+
+    causes: of the drives; finding: of the scans as they are; look: criticises the scans of a recording. If the laser's
+    clock still drifts then, it does so by itself, and the finding is what it was.
+    """
+    told = next(((cause.id, times) for cause in causes if (times := _stamped_by(cause, model)) is not None), None)
+    if told is None or not _drifting(finding):
+        return finding, recording
+    name, times = told
+    first = min((float(run.pose.t[0]) for run in recording.runs if run.pose is not None), default=0.0)
+    stamped = replace(recording, runs=tuple(_restamped(run, times, first) for run in recording.runs))
+    again = look(stamped)
+    if again.refused is not None or again.wrong is not None or _drifting(again):
+        return finding, recording
+    words = f"laser: by the reference its clock seems to drift; the cause is {name}, not the laser's clock."
+    return replace(again, details=(*again.details, words)), stamped
+
+
+def _drifting(finding: LaserFinding) -> bool:
+    named = [cause.id for cause in finding.causes]
+    return any(drifts(name) for name in (*named, *(name for group in finding.confounded for name in group)))
+
+
+def _stamped_by(cause: Cause, model: Model) -> _Times | None:
+    """Return the stamps that a reference gives to times, as its drive began at a time; None if they are the same."""
+    effect = effects.by_id(cause.id)
+    if not issubclass(effect, ReferenceEffect):
+        return None
+    context = Context(model.translation, model.steering, np.random.default_rng(0))
+    values = {p.name: p.null for p in effect.parameters} | {n: known.estimate for n, known in cause.parameters.items()}
+
+    def stamped(times: FloatArray, start: float) -> FloatArray:
+        none = np.zeros((*times.shape, 3))
+        return effect(values, context).apply(Reference(times, none, none, start)).times
+
+    return stamped if abs(stamped(np.array([0.0, _LATER]), 0.0)[1] - _LATER) > _NONE else None
+
+
+def _restamped(run: Run, times: _Times, first: float) -> Run:
+    """Return a run whose reference has the stamps of the others' clock; first [s]: of all runs."""
+    if run.pose is None:
+        return run
+    since = run.pose.t - first
+    ends = np.array([since[0], since[-1] + 1.0])
+    low, high = times(ends, float(since[0]))
+    slope = (high - low) / (ends[1] - ends[0])
+    return replace(run, pose=replace(run.pose, t=first + ends[0] + (since - low) / slope))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu import effects
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge.clock_drift import without_double_delay
 from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter, with_shifting_forms
@@ -35,6 +36,7 @@ from kurumaisu.critic.ranges.search.mean_effects import (
 from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_rows
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
+from kurumaisu.critic.ranges.search.pose_curves_left import pose_curves_left
 from kurumaisu.critic.scatter.common_offset import own_sd
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
@@ -63,11 +65,12 @@ class _Question:
 
 
 def criticise_scans(
-    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None, *, posed: bool = False
 ) -> LaserFinding:
     """Return what the scans of a recording say against a model, or why they cannot.
 
-    ids: the effects that may be named; None for all.
+    ids: the effects that may be named; None for all. posed: whether the laser may be elsewhere than the reference says
+    from the start on; else this is asked at the end.
     """
     why = why_not_usable(recording)
     if why is not None:
@@ -83,7 +86,7 @@ def criticise_scans(
     progress("laser: comparing effects")
     normal, found = _searched(assembly, normal, recording.truth)
     normal, families = with_doubt(assembly, normal, found)
-    made = mean_effects(assembly, normal, found, families)
+    made = mean_effects(assembly, normal, found, families, posed=posed)
     if (wrong := another_map(made.winner, normal, float(assembly.map_change.readings.mean()))) is not None:
         return LaserFinding(wrong=wrong)
     progress("laser: fitting the effects found")
@@ -96,7 +99,11 @@ def criticise_scans(
         # What equations nearly right leave of what acts looks like a reference that wanders, too.
         if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
             progress("laser: the reference errs by more than is said")
-            return criticise_scans(replace(recording, truth=None), model, progress, ids)
+            return criticise_scans(replace(recording, truth=None), model, progress, ids, posed=posed)
+    curves = ids is None or effects.SMOOTH in ids
+    if curves and not posed and not made.curve and pose_curves_left(fit, normal):
+        progress("laser: it is elsewhere than the reference says")
+        return criticise_scans(recording, model, progress, ids, posed=True)
     return _with_scatter(question, MeanFit(assembly, normal, made, fit))
 
 

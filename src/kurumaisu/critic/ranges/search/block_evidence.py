@@ -72,10 +72,14 @@ class BlockComparison:
 
     @property
     def least(self) -> float:
-        """Lead that a curve needs [nat]: none where something acts for sure."""
+        """Lead that a curve needs [nat]: none where something acts for sure, but for what a line misses of geometry."""
         nothing = max((fit.score for fit in self.found.fits if not fit.forms), default=0.0)
-        curve = next((rival.log_posterior for rival in self.rivals if rival.unknown), nothing)
-        return BEYOND if curve - nothing < CERTAIN else 0.0
+        curve = next((rival for rival in self.rivals if rival.unknown), None)
+        over = 0.0 if curve is None else curve.log_posterior - nothing
+        geometry = any(not issubclass(effects.by_id(name), effects.ReadingEffect) for name in self.found.best.ids)
+        if geometry and curve is not None and curve.free.pose is None:
+            return max(BEYOND, LEFT * over)
+        return BEYOND if over < CERTAIN else 0.0
 
     @property
     def fit(self) -> FittedForms:

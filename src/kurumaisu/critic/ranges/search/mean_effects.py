@@ -104,9 +104,15 @@ def with_doubt(assembly: Assembly, normal: NormalEquations, found: FormPosterior
     return assembly.with_families(list(families.values())).full(normal), spans
 
 
-def mean_effects(assembly: Assembly, normal: NormalEquations, found: FormPosterior, families: Families) -> MeanEffects:
-    """Return what acts by a search, with blocks in the running; families: what equations may miss, by effect."""
-    weighed = block_evidence.compare_blocks(found, assembly.free, normal.gram, families)
+def mean_effects(
+    assembly: Assembly, normal: NormalEquations, found: FormPosterior, families: Families, *, posed: bool
+) -> MeanEffects:
+    """Return what acts by a search, with blocks in the running.
+
+    families: what equations may miss, by effect; posed: whether curves of the laser's pose are in the running.
+    """
+    free = [each for each in assembly.free if posed or each.pose is None]
+    weighed = block_evidence.compare_blocks(found, free, normal.gram, families)
     winner = weighed.winner
     if winner is None:
         others = form_families(assembly, normal, [weighed.fit])

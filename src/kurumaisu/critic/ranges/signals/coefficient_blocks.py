@@ -80,7 +80,7 @@ def blocks(
     columns: list[NDArray[np.float32]] = []
     parts = list(_drawn(shots, marks, ids))
     if ids is None or effects.SMOOTH in ids:
-        parts += [*_curves(shots, marks), *_pose_curves(shots, marks, poses)]
+        parts += [*_curves(shots, marks), *pose_curves(shots, marks, poses)]
     for free, part in sorted(parts, key=lambda each: not each[0].whole):
         found.append(replace(free, span=slice(start, start + part.shape[2])))
         columns.append(part.astype(np.float32))
@@ -142,7 +142,7 @@ def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatAr
             yield Block(effects.smooth_range_id(name), None, basis, basis.priors, slice(0), whole), columns
 
 
-def _pose_curves(shots: Shots, marks: EffectColumns, poses: FloatArray) -> Iterator[tuple[Block, FloatArray]]:
+def pose_curves(shots: Shots, marks: EffectColumns, poses: FloatArray) -> Iterator[tuple[Block, FloatArray]]:
     """Yield what a laser that is not where the reference says may follow: its heading, or its place in the map.
 
     The reference may err, or the laser may move on the robot: the scans alone do not tell.
