@@ -32,8 +32,7 @@ def scene(rng):
     )
     shots = SimpleNamespace(
         stamps=np.linspace(0.0, 300.0, SCANS),
-        laser=SimpleNamespace(bearings=np.linspace(-2.0, 2.0, BEAMS), beams=BEAMS),
-        known={"v": rng.uniform(-0.5, 0.5, SCANS), "w": rng.uniform(-0.5, 0.5, SCANS)},
+        laser=SimpleNamespace(bearings=np.linspace(-2.0, 2.0, BEAMS)),
     )
     return shots, seen, wall
 

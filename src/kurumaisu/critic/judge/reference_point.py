@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.judge.clock_drift import Look
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.verdict import NORMAL90, Cause
@@ -25,7 +26,6 @@ from kurumaisu.types import FloatArray
 _SAME = 3.0  # sds by which two sizes may differ: those of two faults would hardly be opposite so closely
 _SHIFT = 1e-6  # [m, rad] below which nothing is elsewhere
 
-Look = Callable[[Recording], LaserFinding]
 _Place = Callable[[Mapping[str, float]], FloatArray]
 
 

@@ -266,12 +266,10 @@ def _sentences(sizes: Mapping[str, float], small: Sequence[str]) -> list[str]:
 
 def _rms(assembly: Assembly, normal: NormalEquations, fit: FittedForms, name: str) -> float:
     valid = normal.beam_noise.valid
-    change, start = np.zeros(int(valid.sum())), 0
-    for form in fit.forms:
-        stop = start + len(form.columns)
+    change = np.zeros(int(valid.sum()))
+    for form, size in fit.parts():
         if form.id == name:
-            change = assembly.columns[valid][:, form.span] @ fit.coefficients[start:stop]
-        start = stop
+            change = assembly.columns[valid][:, form.span] @ size
     return size_of(change)
 
 

@@ -177,10 +177,8 @@ class _Doubted:
         return self._known[key]
 
     def _weighed(self, fit: FittedForms) -> tuple[FittedForms, FloatArray]:
-        drawn, start = [], 0
-        for form in fit.forms:
-            size = fit.coefficients[start : start + len(form.columns)]
-            start += len(form.columns)
+        drawn = []
+        for form, size in fit.parts():
             if form.id in self._families:
                 drawn.append((*self._families[form.id], float(size @ self._gram[form.span, form.span] @ size)))
         if not drawn:
@@ -287,11 +285,8 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
 
 def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:
     """Return the effect beside a curve that does what the curve does where it is one everywhere: its size varies."""
-    start = 0
     one = gram[rival.free.span, rival.free.span].sum()
-    for form in rival.fit.forms:
-        size = rival.fit.coefficients[start : start + len(form.columns)]
-        start += len(form.columns)
+    for form, size in rival.fit.parts():
         across = float(gram[rival.free.span, form.span].sum(axis=0) @ size)
         own = float(size @ gram[form.span, form.span] @ size)
         if abs(across) >= _ALIKE * np.sqrt(one * own):

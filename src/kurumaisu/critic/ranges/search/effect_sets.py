@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,14 @@ class FittedForms:
     def ids(self) -> frozenset[str]:
         """The effects."""
         return frozenset(form.id for form in self.forms)
+
+    def parts(self) -> Iterator[tuple[Form, FloatArray]]:
+        """Yield each form with its coefficients."""
+        start = 0
+        for form in self.forms:
+            stop = start + len(form.columns)
+            yield form, self.coefficients[start:stop]
+            start = stop
 
     def without(self, ids: frozenset[str]) -> FittedForms:
         """Return the other effects, as they were fitted beside these."""

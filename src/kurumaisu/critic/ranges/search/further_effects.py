@@ -97,13 +97,9 @@ def _curves(
     assembly: Assembly, fit: FittedForms, others: Mapping[str, FormFamily]
 ) -> list[tuple[FormFamily, FloatArray]]:
     """Return the curves that effects of a fit may follow instead, and what these effects do (k, b) [m]."""
-    out, start = [], 0
-    for form in fit.forms:
-        own = slice(start, start + len(form.columns))
-        start = own.stop
-        if form.id in others:
-            out.append((others[form.id], assembly.columns[:, :, form.span] @ fit.coefficients[own]))
-    return out
+    return [
+        (others[form.id], assembly.columns[:, :, form.span] @ size) for form, size in fit.parts() if form.id in others
+    ]
 
 
 def _gram(

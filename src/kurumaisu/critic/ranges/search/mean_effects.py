@@ -61,11 +61,7 @@ class MeanEffects:
 
     def parts(self) -> list[Part]:
         """Return what acts, one by one."""
-        out, start = [], 0
-        for form in self.fit.forms:
-            stop = start + len(form.columns)
-            out.append(Part(form.id, form.span, self.fit.coefficients[start:stop]))
-            start = stop
+        out = [Part(form.id, form.span, size) for form, size in self.fit.parts()]
         return [*out, Part(self.winner.free.id, self.winner.free.span, self.coefficients)] if self.winner else out
 
 
@@ -78,15 +74,12 @@ def form_families(
     """
     out: dict[str, FormFamily] = {}
     for fit in fits:
-        start = 0
-        for form in fit.forms:
-            stop = start + len(form.columns)
+        for form, size in fit.parts():
             if form.id not in out and _on_readings(form.id) and (most is None or len(out) < most):
-                change = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
+                change = assembly.columns[:, :, form.span] @ size
                 found = form_family(change, assembly.shots, assembly.marks.seen, normal.beam_noise.valid)
                 if found is not None:
                     out[form.id] = found
-            start = stop
     return out
 
 
