@@ -30,11 +30,9 @@ def dominant_effect(
 ) -> EffectSetting | None:
     """Return the loudest effect that moves beams and, refitted by simulation, does quite another thing than by line."""
     settings = {setting.id: setting for setting, _ in refitted.settings}
-    loudest, out, start = STRONG, None, 0
-    for form in fit.forms:
-        stop = start + len(form.columns)
-        line = assembly.columns[:, :, form.span] @ fit.coefficients[start:stop]
-        start = stop
+    loudest, out = STRONG, None
+    for form, coefficients in fit.parts():
+        line = assembly.columns[:, :, form.span] @ coefficients
         if issubclass(effects.by_id(form.id), effects.ReadingEffect):
             continue
         change = assembly.marks.together([settings[form.id]])
@@ -49,11 +47,10 @@ def vanished_effects(assembly: Assembly, fit: FittedForms, refitted: ParameterFi
 
     They had drawn what the line of another one misses.
     """
-    out, start = set[str](), 0
+    out = set[str]()
     sizes = {setting.id: (setting.parameters, sds) for setting, sds in refitted.settings}
-    for form in fit.forms:
-        effect, column, line = effects.by_id(form.id), form.columns[0], float(fit.coefficients[start])
-        start += len(form.columns)
+    for form, coefficients in fit.parts():
+        effect, column, line = effects.by_id(form.id), form.columns[0], float(coefficients[0])
         if issubclass(effect, effects.ReadingEffect) or len(form.columns) > 1 or column.squared:
             continue
         p, (values, sds) = column.parameter, sizes[form.id]

@@ -16,10 +16,8 @@ from kurumaisu.params import EffectSetting
 
 def settings_of(assembly: Assembly, fit: FittedForms) -> list[EffectSetting]:
     """Return the fitted effects as a model file has them."""
-    out, start = [], 0
-    for form in fit.forms:
-        at = fit.coefficients[start : start + len(form.columns)]
-        start += len(form.columns)
+    out = []
+    for form, at in fit.parts():
         effect = effects.by_id(form.id)
         if len(form.columns) > 1 and form.columns[0].beside:
             out.append(EffectSetting(form.id, {**assembly.marks.null(effect), **assembly.marks.joined(form, at)}))
