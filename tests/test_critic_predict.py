@@ -163,7 +163,7 @@ def test_few_poses_or_none_are_enough():
 def test_a_run_that_nothing_drove_is_not_predicted():
     run = replace(drives_of("usual", 8)[0], command=None, voltage=None, queries=np.array([[1.0, 2.0]]))
     made = Recording("r", (run,), train=(), test=(run.name,))
-    (one,) = predictions.predictions(made, MODEL, Forecast(MODEL, (), noise_of(REGIMES["usual"])), ())
+    (one,) = predictions.predictions(made, Forecast(MODEL, (), noise_of(REGIMES["usual"])), [])
     assert np.isnan(one.means).all()
 
 

@@ -31,7 +31,7 @@ def withheld(data, every=4):
 
 
 def predicted(data, settings=()):
-    made = list(predictions.predictions(data, MODEL, None, settings))
+    made = list(predictions.ranges(data, MODEL, None, settings))
     assert all(one.is_scan for one in made)
     return np.array([one.means for one in made]), np.array([one.sds for one in made])
 
@@ -79,7 +79,7 @@ def test_rows_are_in_the_order_of_the_queries(tmp_path):
     run = data.runs[1]
     mixed = np.array([run.queries[1], [1.0, 2.0], run.queries[0]])
     asked = Recording(**{**vars(data), "runs": (data.runs[0], replace(run, queries=mixed))})
-    made = list(predictions.predictions(asked, MODEL, None, ()))
+    made = list(predictions.predictions(asked, None, list(predictions.ranges(asked, MODEL, None, ()))))
     assert [(one.t0, one.t1) for one in made] == [tuple(row) for row in mixed.tolist()]
     assert [len(one.means) for one in made] == [682, 3, 682]
     lines = predictions.prediction_table(made).splitlines()

@@ -12,7 +12,7 @@ from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.heldout.extension_gain import with_gains
 from kurumaisu.critic.judge import explain
-from kurumaisu.critic.judge.clock_drift import by_its_clock, drifts
+from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import with_scans
@@ -70,17 +70,20 @@ def criticise(
         return criticise_scans(moved, model, progress, ids)
 
     seen, stamped = by_its_clock(found.verdict.causes, scans, recording, model, again)
-    drifting = scans.settings if seen is not scans else ()
     scans, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
-    settings = (*settings, *(one for one in drifting if drifts(one.id)))
     found = with_scans(found, scans)
-    found = with_gains(found, whole, replace(extension, scans=settings), progress, slam=slam)
+    forecast = extension.forecast
+    if forecast is not None and stamped is not recording:
+        forecast = replace(forecast, settings=by_commands(forecast.settings, model))
+    stamped = with_elapsed_time(stamped)
+    found = with_gains(found, stamped, replace(extension, forecast=forecast, scans=settings), progress, slam=slam)
     found = with_robot(found, recording)
     if not predictions.asked(recording):
         return found
     progress("predicting what the queries ask for")
     every = (*found.settings, *(each for each in settings if each not in found.settings))
-    return replace(found, predictions=tuple(predictions.predictions(whole, model, extension.forecast, every)))
+    ranges = list(predictions.ranges(stamped, model, forecast, every))
+    return replace(found, predictions=tuple(predictions.predictions(whole, extension.forecast, ranges)))
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

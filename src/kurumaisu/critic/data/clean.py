@@ -7,6 +7,7 @@ noted; and where there is more of it than a delivery hiccup explains, the record
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,8 +18,10 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 # More than this share of rows out of order, contradictory or not numbers is no hiccup [1].
 HICCUP_SHARE = 0.05
-# A stamp further back than this was not delayed on its way: the clock was set [s].
+# Stamps that are further back than this, and fill no hole that a late row left, are of a clock that was set [s].
 HICCUP_TIME = 0.5
+# Rows that came late leave steps of at least this share of the usual one beside them.
+HOLE = 0.75
 # Rows further from all others than this, and than so many usual steps, have stamps of another time [s].
 FURTHEST_STEP = 86_400.0
 _USUAL_STEPS = 1e4
@@ -79,7 +82,7 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     kept = np.flatnonzero(keep & sane)
     kept = kept[~_stamp_outliers(table, kept, faults)]
     kept = kept[~_repeated(table, kept, faults)]
-    _out_of_order(table, kept, faults)
+    kept = kept[~_of_wrong_order(table, kept, faults)]
     if not len(kept):
         faults.add(f"{table.where}: has no rows")
         return None
@@ -153,20 +156,57 @@ def _repeated(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     return repeated
 
 
-def _out_of_order(table: Table, kept: IntArray, faults: Faults) -> None:
-    steps = np.diff(table.t[kept])
-    back = np.flatnonzero(steps < 0)
+def _of_wrong_order(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
+    """Return which of the kept rows, (k,), cannot be put in order: their stamps are wrong.
+
+    A row that came late fills a hole among the others; a single wrong stamp leaves one. Where neither is so, time
+    began anew: the clock was set back.
+    """
+    t = table.t[kept]
+    moved = ~_longest_rise(t)
+    wrong = np.zeros(len(t), dtype=bool)
+    if not moved.any():
+        return wrong
+    usual = float(np.median(np.diff(t[~moved]))) if (~moved).sum() > 1 else 0.0
+    rest = np.r_[-np.inf, t[~moved], np.inf]
+    hole = np.searchsorted(rest, t[moved])
+    late = (rest[hole] - rest[hole - 1]) / (np.bincount(hole)[hole] + 1) > HOLE * usual
+    around = np.r_[np.inf, t[2:] - t[:-2], np.inf][: len(t)]
+    alone = ~(np.r_[False, moved[:-1]] | np.r_[moved[1:], False])
+    wrong[moved] = ~late & (alone & (around > 2 * HOLE * usual))[moved]
+    _report(
+        table, np.isin(np.arange(len(table.t)), kept[wrong]), faults, "stamped out of turn: dropped", "is out of turn"
+    )
+    back = np.flatnonzero(np.diff(t[~wrong]) < 0)
     if not len(back):
-        return
-    furthest = float(-steps.min())
-    fatal = len(back) > HICCUP_SHARE * len(steps) or furthest > HICCUP_TIME
+        return wrong
+    setback = (np.maximum.accumulate(t) - t)[moved][~late & ~wrong[moved]]
+    fatal = moved.sum() > HICCUP_SHARE * len(t) or bool((setback > HICCUP_TIME).any())
     times = "once" if len(back) == 1 else f"{len(back)} times"
     ending = "the clock cannot be trusted" if fatal else "rows sorted"
     faults.add(
-        f"{table.where}: time goes backward {times}, by up to {furthest:.3g} s "
-        f"(first: {table.place(int(kept[back[0] + 1]))}): {ending}",
+        f"{table.where}: time goes backward {times}, by up to {-np.diff(t[~wrong]).min():.3g} s "
+        f"(first: {table.place(int(kept[~wrong][back[0] + 1]))}): {ending}",
         fatal=fatal,
     )
+    return wrong
+
+
+def _longest_rise(t: FloatArray) -> BoolArray:
+    """Return the most rows that are in the order of time as they stand, (n,)."""
+    tails: list[float] = []
+    last: list[int] = []
+    before = np.empty(len(t), dtype=int)
+    for i, value in enumerate(t.tolist()):
+        at = bisect_right(tails, value)
+        before[i] = last[at - 1] if at else -1
+        tails[at : at + 1], last[at : at + 1] = [value], [i]
+    rise = np.zeros(len(t), dtype=bool)
+    i = last[-1] if last else -1
+    while i >= 0:
+        rise[i] = True
+        i = before[i]
+    return rise
 
 
 def _ranges(where: str, series: Series, faults: Faults) -> Series:

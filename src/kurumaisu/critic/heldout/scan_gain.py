@@ -49,7 +49,7 @@ def measure(recording: Recording, model: Model, forecast: Forecast | None, setti
     squares: tuple[list[FloatArray], list[FloatArray]] = ([], [])
     for split in _splits(recording, model, forecast):
         refitted = settings if split.apart else _refit(split.known, split.train, settings)
-        sides = [_side(split, some, recording.truth) for some in ((), refitted)]
+        sides = [_side(split, some) for some in ((), refitted)]
         use = sides[0].counts & sides[1].counts
         for i, side in enumerate(sides):
             joint = Joint(side.what, side.error, use)
@@ -77,9 +77,9 @@ class _Side:
     counts: BoolArray
 
 
-def _side(split: Split, settings: Settings, truth: tuple[float, float] | None) -> _Side:
+def _side(split: Split, settings: Settings) -> _Side:
     measured = split.known.shots.measured
-    trained = scattered(split.known.rows(settings, split.train), measured[split.train], settings, truth)
+    trained = scattered(split.known.rows(settings, split.train), measured[split.train], settings)
     what = split.known.rows(settings, split.test)
     error = measured[split.test] - what.mean
     with np.errstate(invalid="ignore"):
@@ -130,7 +130,7 @@ def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
     if not changes:
         return settings
     error = measured - base.mean
-    sd = scattered(base, measured, settings, None).of(base)[1]
+    sd = scattered(base, measured, settings).of(base)[1]
     use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < OUTLIER)
     keys, columns, sizes = [], [], []
     for key, size, change in changes:

@@ -6,7 +6,7 @@ Nobody knows from when on it does: if clocks agreed later than at 0, a delay is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import Cause
 from kurumaisu.effects import BeamEffect, Beams, Context, Reference, ReferenceEffect
 from kurumaisu.params import Model
@@ -46,11 +47,11 @@ def without_double_delay(finding: LaserFinding, stamps: FloatArray) -> LaserFind
     if first < _NEAR:
         return finding
     clocks = {cause.id: _clock(cause) for cause in finding.causes}
-    drifts = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER > _NONE]
+    running = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER > _NONE]
     delays = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER <= _NONE]
-    if len(drifts) != 1 or len(delays) != 1:
+    if len(running) != 1 or len(delays) != 1:
         return finding
-    (drifting, drift), (late, delay) = *drifts, *delays
+    (drifting, drift), (late, delay) = *running, *delays
     agreed = -(delay.at + drift.at) / drift.growth
     if abs(agreed - first) > _NEAR + _SURE * delay.half / abs(drift.growth):
         return finding
@@ -58,7 +59,7 @@ def without_double_delay(finding: LaserFinding, stamps: FloatArray) -> LaserFind
     return replace(finding, causes=tuple(c for c in finding.causes if c.id != late), details=(*finding.details, told))
 
 
-def drifts(name: str) -> bool:
+def _drifts(name: str) -> bool:
     """Return whether an effect of a usual size lets the time of a scan drift."""
     effect = effects.by_id(name)
     if not issubclass(effect, BeamEffect):
@@ -92,7 +93,8 @@ def by_its_clock(
     causes: of the drives; finding: of the scans as they are; look: criticises the scans of a recording. If the laser's
     clock still drifts then, it does so by itself, and the finding is what it was.
     """
-    told = next(((cause.id, times) for cause in causes if (times := _stamped_by(cause, model)) is not None), None)
+    known = [(cause.id, {name: one.estimate for name, one in cause.parameters.items()}) for cause in causes]
+    told = next(((name, times) for name, v in known if (times := _stamped_by(name, v, model)) is not None), None)
     if told is None or not _drifting(finding):
         return finding, recording
     name, times = told
@@ -107,16 +109,21 @@ def by_its_clock(
 
 def _drifting(finding: LaserFinding) -> bool:
     named = [cause.id for cause in finding.causes]
-    return any(drifts(name) for name in (*named, *(name for group in finding.confounded for name in group)))
+    return any(_drifts(name) for name in (*named, *(name for group in finding.confounded for name in group)))
 
 
-def _stamped_by(cause: Cause, model: Model) -> _Times | None:
+def by_commands(settings: Settings, model: Model) -> Settings:
+    """Return settings for a reference that is stamped by the commands' clock."""
+    return tuple(one for one in settings if _stamped_by(one.id, one.parameters, model) is None)
+
+
+def _stamped_by(name: str, values: Mapping[str, float], model: Model) -> _Times | None:
     """Return the stamps that a reference gives to times, as its drive began at a time; None if they are the same."""
-    effect = effects.by_id(cause.id)
+    effect = effects.by_id(name)
     if not issubclass(effect, ReferenceEffect):
         return None
     context = Context(model.translation, model.steering, np.random.default_rng(0))
-    values = {p.name: p.null for p in effect.parameters} | {n: known.estimate for n, known in cause.parameters.items()}
+    values = {p.name: p.null for p in effect.parameters} | dict(values)
 
     def stamped(times: FloatArray, start: float) -> FloatArray:
         none = np.zeros((*times.shape, 3))

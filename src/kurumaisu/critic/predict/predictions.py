@@ -33,14 +33,8 @@ def asked(recording: Recording) -> tuple[Run, ...]:
     return tuple(run for run in recording.runs if run.queries is not None and len(run.queries))
 
 
-def predictions(
-    recording: Recording, model: Model, forecast: Forecast | None, settings: Settings
-) -> Iterator[Prediction]:
-    """Yield all that was asked for, runs in their order.
-
-    forecast: None where nobody drove; settings: all that extends the model, the laser's, too.
-    """
-    scans = list(ranges(recording, model, forecast, settings))
+def predictions(recording: Recording, forecast: Forecast | None, scans: Sequence[Prediction]) -> Iterator[Prediction]:
+    """Yield all that was asked for, runs in their order; forecast: None where nobody drove; scans: as of ranges."""
     for run in asked(recording):
         assert run.queries is not None
         made = _motions(run, forecast) + [one for one in scans if one.run == run.name]
@@ -58,14 +52,17 @@ def _motions(run: Run, forecast: Forecast | None) -> list[Prediction]:
 
 
 def ranges(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> Iterator[Prediction]:
-    """Yield the scans asked for; nan throughout where there is no map, no pose, or no scan to learn from."""
+    """Yield the scans asked for; nan throughout where there is no map, no pose, or no scan to learn from.
+
+    recording: its reference stamped by the scans' clock, as forecast is; settings: all that extends the model.
+    """
     stamps = {run.name: _stamps(run) for run in asked(recording)}
     wanted = [run for run in asked(recording) if len(stamps[run.name])]
     if not wanted:
         return
     able = why_not_usable(recording) is None
     places = ScanPoses(recording, model, forecast) if able else None
-    refiner = trained_matcher(places, settings, recording.truth) if places else None
+    refiner = trained_matcher(places, settings) if places else None
     for run in wanted:
         if places is None or refiner is None or run.pose is None:
             beams = _beams(recording, model)

@@ -16,11 +16,10 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
-_START = (1.0, 0.005, 0.005, 3e-4)  # factor on the laser's own deviation; pose [m], [rad]; common to all [m]
-# Of their natural logarithms, 1 sd: how far from there they remain plausible; poses between rows err less than rows.
-_SPREAD = (0.4, 1.5, 1.5, 1.5)
-_KNOWN = (0.4, 0.5, 0.5, 1.5)
+_START = (1.0, 1.0, 1.0, 3e-4)  # factors on the laser's own deviation, on the doubt of the pose; common to all [m]
+_SPREAD = (0.4, 1.0, 1.0, 1.5)  # of their natural logarithms, 1 sd: how far from there they remain plausible
 _MOVE = np.array([0.006, 0.006, 0.006])  # [m, m, rad] by which poses are moved to see what their errors do
+_DRAWS, _WIDER = 128, 2.0  # poses that are tried for what a beam meets, and how much wider than likely they are drawn
 OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
 _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
@@ -32,8 +31,8 @@ _LEAST = 1e-4  # [m]
 class Expected:
     """Mean (k, b) [m], nan where nothing is to be expected; parts of the variance (4, k, b) [m^2] for unit factors.
 
-    shared (k, b, 4): what a reading does by errors that its scan shares: of the pose, x, y [m], yaw [rad], and of all
-    readings [m]. place: (k, b) which beams meet a wall well inside, where errors are small and alike.
+    shared (k, b, 4): what a reading does by errors that its scan shares: of the pose, x, y, yaw, as shares of their
+    doubt, and of all readings [m]. place: (k, b) which beams meet a wall well inside, where errors are small and alike.
     """
 
     mean: FloatArray
@@ -51,8 +50,27 @@ class ScanModel:
     tails: tuple[float, float]
 
     def predict(self, shots: Shots) -> tuple[FloatArray, FloatArray]:
-        """Return means and standard deviations (k, b) [m]; both nan where no return is to be expected."""
-        return self.of(expected(shots, self.settings))
+        """Return means and standard deviations (k, b) [m]; both nan where no return is to be expected.
+
+        Where the pose decides which of two walls a beam meets, the mean and deviation are those of either.
+        """
+        settings = without_random(shots, self.settings)
+        around = shifted_hits(shots, settings)
+        mean, sd = self.of(expected_from(shots, settings, around))
+        moves = np.random.default_rng(0).normal(0.0, _WIDER, (_DRAWS, 3))
+        weights = np.exp(-0.5 * np.sum(moves**2 * (1 - _WIDER**-2), axis=1))
+        place = (doubts(shots) * self.factors[[1, 1, 2]])[:, np.newaxis]
+        looks = [
+            predict(shots, settings, hits_of(shots, settings, 0, shift=m * place, like=around[0]), 0) for m in moves
+        ]
+        off = np.array(looks) - mean
+        weighed = np.where(np.isfinite(off), weights[:, np.newaxis, np.newaxis], 0.0)
+        weighed /= np.maximum(weighed.sum(axis=0), 1e-9)
+        off = np.nan_to_num(off)
+        drift = np.sum(weighed * off, axis=0)
+        spread = np.sqrt(np.sum(weighed * (off - drift) ** 2, axis=0))
+        jumps = (np.abs(off) > OUTLIER * sd).any(axis=0) & (spread > sd)
+        return np.where(jumps, mean + drift, mean), np.where(jumps, np.hypot(sd, spread), sd)
 
     def of(self, what: Expected) -> tuple[FloatArray, FloatArray]:
         """Return the same of readings that are worked out."""
@@ -81,14 +99,21 @@ def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Seque
     own = np.square(predict(shots, settings, seen, 0, noise=1.0) - mean)
     moved = np.zeros((3, *mean.shape))
     shared = np.ones((*mean.shape, 4))
+    doubt = doubts(shots)
     for i, size in enumerate(_MOVE):
         sides = around[1 + 2 * i : 3 + 2 * i]
         # Where a moved beam meets nothing, the move says nothing.
-        low, high = (np.nan_to_num((predict(shots, settings, side, 0) - mean) / size) for side in sides)
+        scale = doubt[:, i, np.newaxis] / size
+        low, high = (np.nan_to_num((predict(shots, settings, side, 0) - mean) * scale) for side in sides)
         moved[i] = 0.5 * (low**2 + high**2)  # at an edge one side jumps
         shared[:, :, i] = 0.5 * (high - low)
     parts = np.array([own, moved[0] + moved[1], moved[2], np.ones_like(mean)])
     return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
+
+
+def doubts(shots: Shots) -> FloatArray:
+    """Return what the pose of each scan may be off, (k, 3) [m, m, rad]."""
+    return np.array([shots.tracks[i].doubt for i in shots.run.tolist()])[:, [0, 0, 1]]
 
 
 def without_random(shots: Shots, settings: Sequence[EffectSetting]) -> Sequence[EffectSetting]:
@@ -111,21 +136,16 @@ def _steady(shots: Shots, settings: Sequence[EffectSetting]) -> bool:
     return np.array_equal(drawn[0], drawn[1], equal_nan=True)
 
 
-def fit_scatter(shots: Shots, settings: Sequence[EffectSetting], truth: tuple[float, float] | None) -> ScanModel:
-    """Return a model of readings whose scatter is that of measured ones; truth: known sd of the reference's poses."""
-    what = expected(shots, settings)
-    return scattered(what, shots.measured, tuple(settings), truth)
+def fit_scatter(shots: Shots, settings: Sequence[EffectSetting]) -> ScanModel:
+    """Return a model of readings whose scatter is that of measured ones."""
+    return scattered(expected(shots, settings), shots.measured, tuple(settings))
 
 
-def scattered(
-    what: Expected, measured: FloatArray, settings: tuple[EffectSetting, ...], truth: tuple[float, float] | None
-) -> ScanModel:
+def scattered(what: Expected, measured: FloatArray, settings: tuple[EffectSetting, ...]) -> ScanModel:
     """Return the same, of readings that are worked out."""
     error = measured - what.mean
     inside = what.place & np.isfinite(error)
     start = np.log(_START)
-    if truth is not None:
-        start[1:3] = np.log(np.maximum(truth, 1e-5))
     factors = np.exp(start)
     for _ in range(2):
         z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
@@ -133,7 +153,7 @@ def scattered(
         near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * SIGMA_PER_MAD * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
-        factors = _factors(Joint(what, error, near), start, np.array(_SPREAD if truth is None else _KNOWN))
+        factors = _factors(Joint(what, error, near), start, np.array(_SPREAD))
     z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
     return ScanModel(settings, factors, (_tail(z[inside]), _tail(z[~what.place & np.isfinite(z)])))
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.predict.scan import OUTLIER, ScanModel, expected, fit_scatter
+from kurumaisu.critic.predict.scan import OUTLIER, ScanModel, doubts, expected, fit_scatter
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
-from kurumaisu.critic.ranges.scans.beams import Shots, Track, some_scans
+from kurumaisu.critic.ranges.scans.beams import Shots, some_scans
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.critic.values.settings import Settings
 from kurumaisu.types import FloatArray, IntArray
@@ -43,17 +43,17 @@ class ScanMatcher:
         return means, sds
 
 
-def trained_matcher(places: ScanPoses, settings: Settings, truth: tuple[float, float] | None) -> ScanMatcher:
+def trained_matcher(places: ScanPoses, settings: Settings) -> ScanMatcher:
     """Return what predicts scans, as it proves on the scans of the runs to fit."""
     runs = places.trained_runs()
     whole = joined([shots for _, shots in runs])
-    alone = fit_scatter(whole, settings, truth)
+    alone = fit_scatter(whole, settings)
     best, after, share = -np.inf, None, 0.0
     parts = [(shots, pose_errors(shots, run, places.zero, alone)) for run, shots in runs]
     parts = [(shots, errors) for shots, errors in parts if errors]
     for tried in _SHARES if sum(len(errors) for _, errors in parts) >= _FEWEST else ():
         some = joined([pose_corrected(shots, errors, tried) for shots, errors in parts])
-        model = fit_scatter(some, settings, None)
+        model = fit_scatter(some, settings)
         density = _density(model, some)
         if density > best:
             best, after, share = density, model, tried
@@ -62,7 +62,7 @@ def trained_matcher(places: ScanPoses, settings: Settings, truth: tuple[float, f
 
 def _density(model: ScanModel, shots: Shots) -> float:
     """Return the mean log density of readings, up to a constant; outliers count as 5 sds."""
-    means, sds = model.predict(shots)
+    means, sds = model.of(expected(shots, model.settings))
     z = (shots.measured - means) / sds
     use = np.isfinite(z)
     return -float(np.mean(0.5 * np.minimum(z[use] ** 2, OUTLIER**2) + np.log(sds[use])))
@@ -86,7 +86,7 @@ def pose_corrected(shots: Shots, errors: Mapping[int, FloatArray], share: float)
     tracks = [(shots.tracks[shots.run[k]], errors[k]) for k in rows]
     return replace(
         some_scans(shots, np.array(rows)),
-        tracks=tuple(Track(track.times, track.poses + share * error) for track, error in tracks),
+        tracks=tuple(replace(track, poses=track.poses + share * error) for track, error in tracks),
         run=np.arange(len(rows)),
     )
 
@@ -119,12 +119,12 @@ def _errors(shots: Shots, owner: IntArray, model: ScanModel) -> dict[int, FloatA
     with np.errstate(invalid="ignore"):
         use = what.place & (np.abs(left / sd) < OUTLIER)
     plausible = np.maximum(model.factors[[1, 1, 2, 3]], 1e-6)
-    out = {}
+    out, doubt = {}, doubts(shots)
     for k in np.unique(owner).tolist():
         mine = owner == k
         columns, own = what.shared[mine][use[mine]], what.parts[0][mine][use[mine]] * model.factors[0] ** 2
         if len(columns) > len(plausible):
             weighed = columns / own[:, np.newaxis]
             inner = weighed.T @ columns + np.diag(plausible**-2)
-            out[int(k)] = np.linalg.solve(inner, weighed.T @ left[mine][use[mine]])[:3]
+            out[int(k)] = np.linalg.solve(inner, weighed.T @ left[mine][use[mine]])[:3] * doubt[mine][0]
     return out

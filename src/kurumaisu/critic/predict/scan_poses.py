@@ -11,6 +11,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
+from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
 from kurumaisu.critic.ranges.scans.beams import Shots, Track, columns_at, gather, rates_at, thin
@@ -22,6 +23,7 @@ _AROUND = np.array([-0.5, -0.3, -0.2, -0.1, 0.0, 0.05, 0.1, 0.2, 0.3])  # [s] ab
 _AFTER = 1e-3  # [s] so much later a pose is asked for, where the last row is of the very stamp
 _NEAR = 0.3  # [s] from a pose on either side within which a scan's place is known
 _SAME = 1e-3  # [s]
+_LEAST = 0.1  # of the reference's errors: no pose is known better
 _RANDOM = 60  # scans that the scatter is estimated from
 
 
@@ -32,6 +34,7 @@ class ScanPoses:
         """Take a recording whose laser can be criticised; forecast: None where nobody knows how the chair moves."""
         self._recording, self._model, self._forecast = recording, model, forecast
         self._base = gather(recording, model)
+        self._truth = recording.truth
         first = next(run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose)
         assert first.pose is not None
         #: [s] at which the laser's time begins.
@@ -44,7 +47,7 @@ class ScanPoses:
         owner = np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int)
         return replace(
             self._base,
-            tracks=tuple(Track(track.times - self.zero, track.poses) for track in tracks),
+            tracks=tuple(replace(track, times=track.times - self.zero) for track in tracks),
             stamps=stamps - self.zero,
             run=owner,
             measured=np.full(shape, np.nan) if measured is None else measured,
@@ -73,7 +76,8 @@ class ScanPoses:
     def _tracks(self, run: Run, stamps: FloatArray) -> list[Track]:
         assert run.pose is not None
         if self._forecast is None or not driven(run):
-            return [Track(run.pose.t, run.pose.values[:, :3])]
+            track = Track(run.pose.t, run.pose.values[:, :3])
+            return [track if self._truth is None else replace(track, doubt=self._truth)]
         forecast = self._forecast
         drive = with_covariates_but_place(prepare_all(run, forecast.model, float(stamps.max()) + _AROUND[-1]), run)
         paths = Paths(drive, forecast.model, forecast.settings, ())
@@ -84,14 +88,24 @@ def _around(drive: Drive, paths: Paths, forecast: Forecast, stamp: float) -> Tra
     """Return where the chair was about a stamp, by the rows up to it: each errs, all together less."""
     row = int(np.searchsorted(drive.times, stamp + 1e-6)) - 1
     if row < 0:
-        return Track(drive.times, drive.poses)
+        return Track(drive.times, drive.poses, (forecast.noise.position_sd, forecast.noise.heading_sd))
     last = float(drive.times[row])
     ahead = motion_ahead(drive, paths, forecast.noise, last, max(stamp, last + _AFTER))
     there = geometry.compose(drive.poses[row], ahead.mean)
     times = stamp + _AROUND
     sim = paths.at(drive, times, [row], stamp)[0]
     middle = int(np.argmin(np.abs(_AROUND)))
-    return Track(times, geometry.compose(np.broadcast_to(there, sim.shape), geometry.between(sim[middle], sim)))
+    poses = geometry.compose(np.broadcast_to(there, sim.shape), geometry.between(sim[middle], sim))
+    white = np.square([forecast.noise.position_sd, forecast.noise.position_sd, forecast.noise.heading_sd])
+    return Track(times, poses, _doubt(ahead.covariance - np.diag(white), forecast.noise))
+
+
+def _doubt(covariance: FloatArray, noise: Noise) -> tuple[float, float]:
+    """Return what a pose may be off, place [m] and heading [rad]; covariance (3, 3): without the reference's errors."""
+    least = max(noise.lasting, _LEAST) ** 2 * np.array([noise.position_sd**2, noise.heading_sd**2])
+    place = np.array([0.5 * (covariance[0, 0] + covariance[1, 1]), covariance[2, 2]])
+    both = np.sqrt(np.maximum(place, 0.0) + least)
+    return float(both[0]), float(both[1])
 
 
 def joined(parts: Sequence[Shots]) -> Shots:

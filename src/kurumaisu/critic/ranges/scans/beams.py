@@ -32,10 +32,11 @@ _ABOUT = 0.15  # [s] before and after a scan, between which its rates are taken
 
 @dataclass(frozen=True)
 class Track:
-    """Reference poses of a run: times (p,) [s], poses (p, 3)."""
+    """Reference poses of a run: times (p,) [s], poses (p, 3); doubt: of their place [m] and heading [rad], 1 sd."""
 
     times: FloatArray
     poses: FloatArray
+    doubt: tuple[float, float] = (0.005, 0.005)
 
 
 @dataclass(frozen=True)
