@@ -13,6 +13,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _AROUND = 1.5  # [s] to either side that tell the speed, but
 _HALF = 8  # intervals at least
+_BESIDE = 3  # intervals to either side that tell its direction
 _LEAST = 40  # intervals while driving
 _MISSING = 5.0  # times the mean interval, from which poses are missing: how fast the robot went there nobody knows
 _CLEAR = 3.0  # sd of the positions' noise that a usual interval's way exceeds
@@ -32,8 +33,8 @@ def problem(pose: Series) -> str | None:
     rows = _intervals(new, _rests(pose, new))
     if rows is None:
         return None
-    longer, further = rows
-    wander = float(np.quantile(np.abs(np.cumsum(longer)), _MOSTLY))  # of stamps from even ones, but for a few
+    longer, further, uneven = rows
+    wander = float(np.quantile(np.abs(uneven), _MOSTLY))  # but for a few
     energy = float(longer @ longer)
     if wander < _JITTER or energy == 0:
         return None
@@ -60,10 +61,10 @@ def _rests(pose: Series, new: Series) -> BoolArray:
     return np.asarray(repeated & (way < MOVING * np.diff(new.t)))
 
 
-def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return how much longer than its neighbours each interval is, and how much further it went [s], both (n,).
+def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return how much longer than its neighbours each interval is, how much further it went, and how uneven its stamp.
 
-    rests (len(pose) - 1,): intervals that do not count, nor do those about them.
+    All (n,) [s]; the last is how far the stamp at its end is from the even ones about it. rests (len(pose) - 1,): intervals that do not count, nor do those about them.
     """
     if len(pose.t) < _LEAST:
         return None
@@ -71,7 +72,7 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] 
     half = max(_HALF, int(_AROUND / dt.mean()))
     if len(dt) < _LEAST + 2 * half:
         return None
-    way = np.hypot(*np.diff(pose.values[:, :2], axis=0).T)
+    way = _along(pose.values[:, :2])
     around = np.ones(2 * half + 1)
     there = dt < _MISSING * float(dt.mean())
     number, time, gone = (np.convolve(each, around, mode="same") for each in (1.0 * there, dt * there, way * there))
@@ -81,4 +82,16 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray] 
     driving[:half] = driving[-half:] = False
     if driving.sum() < _LEAST:
         return None
-    return (dt - usual)[driving], (way / np.maximum(speed, 1e-9) - usual)[driving]
+    longer = np.where(there, dt - usual, 0.0)
+    drift = np.cumsum(longer)
+    uneven = drift - np.convolve(drift, around / len(around), mode="same")
+    return longer[driving], (way / np.maximum(speed, 1e-9) - usual)[driving], uneven[driving]
+
+
+def _along(places: FloatArray) -> FloatArray:
+    """Return how far (n - 1,) [m] a robot went between places (n, 2), along its way: whatever noise adds to a length."""
+    last = len(places) - 1
+    rows = np.arange(last)
+    ahead = places[np.minimum(rows + 1 + _BESIDE, last)] - places[np.maximum(rows - _BESIDE, 0)]
+    unit = ahead / np.maximum(np.hypot(*ahead.T), 1e-9)[:, np.newaxis]
+    return np.asarray(np.sum(np.diff(places, axis=0) * unit, axis=1))
