@@ -119,9 +119,10 @@ def sign(p, v, w):
 @_rates("base.cross_v_to_w")
 @_each
 def cross_v_to_w(p, v, w):
-    """A leak [V] beside V_s turns the chair by its slope."""
+    """A leak [V] beside V_s turns the chair by its slope; with rests, not one that is to go straight."""
     slope, _ = branch("steering", w)
-    return v, 0.0, w + p["share"] * volts("translation", v) / slope
+    leak = 0.0 if p["rests"] >= 0.5 and w == 0 else p["share"] * volts("translation", v)
+    return v, 0.0, w + leak / slope
 
 
 def _swallowed(axis, rate, p):

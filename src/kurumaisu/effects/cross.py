@@ -3,6 +3,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 
 
@@ -26,15 +28,20 @@ class CrossWToV(Effect):
 class CrossVToW(Effect):
     """The yaw rate that a share of V_f makes on the steering input: crosstalk of the joystick's two lines.
 
-    Other than base.veer it has the jump of V_f where the chair starts to move.
+    Other than base.veer it has the jump of V_f where the chair starts to move. rests: 1 where a chair that is to go
+    straight does not turn, its leak being within the dead zone of the steering.
     """
 
     id = "base.cross_v_to_w"
     stage = Stage.GAIN
     of_voltages = True
-    parameters = (Parameter("share", "1", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
+    parameters = (
+        Parameter("share", "1", null=0.0, scale=0.01, lower=-0.5, upper=0.5),
+        Parameter("rests", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+    )
+    forms = ({"rests": 0.0}, {"rests": 1.0})
     sentence = "the translation voltage leaks into the steering"
-    formula = "w + share · V_f(v) · gain of V_s(w)"
+    formula = "w + share · V_f(v) · gain of V_s(w); with rests = 1, w where no turn is asked for"
     source = "paper, section on identification: weak, correlation 0.003"
     shows_in = Rate.W
     follows = Follows.V
@@ -42,4 +49,6 @@ class CrossVToW(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Add what a share of V_f makes to w."""
         leak = self.values["share"] * self.context.translation.volts(motion.v)
+        if self.values["rests"] >= 0.5:
+            leak = np.where(motion.known.get("w_asked", motion.w) == 0, 0.0, leak)
         return replace(motion, w=motion.w + leak * self.context.steering.gain(motion.w))
