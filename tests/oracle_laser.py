@@ -64,9 +64,10 @@ def _reflectance(p, b):
 
 def _saturation(p, b):
     reading = b.mean + b.sd * b.noise
-    if reading < p["near"]:
-        reading = p["near"]
-    return 1 / p["inverse_far"] if reading * p["inverse_far"] > 1 else reading
+    far = reading * p["inverse_far"] > 1
+    if p["lost"] >= 0.5:
+        return math.inf if far or reading < p["near"] else reading
+    return 1 / p["inverse_far"] if far else max(reading, p["near"])
 
 
 def _quantisation(p, b):

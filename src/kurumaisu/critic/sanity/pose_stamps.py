@@ -64,7 +64,8 @@ def _rests(pose: Series, new: Series) -> BoolArray:
 def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return how much longer than its neighbours each interval is, how much further it went, and how uneven its stamp.
 
-    All (n,) [s]; the last is how far the stamp at its end is from the even ones about it. rests (len(pose) - 1,): intervals that do not count, nor do those about them.
+    All (n,) [s]; the last is how far the stamp at its end is from the even ones about it. rests (len(pose) - 1,):
+    intervals that do not count, nor do those about them.
     """
     if len(pose.t) < _LEAST:
         return None
@@ -89,7 +90,7 @@ def _intervals(pose: Series, rests: BoolArray) -> tuple[FloatArray, FloatArray, 
 
 
 def _along(places: FloatArray) -> FloatArray:
-    """Return how far (n - 1,) [m] a robot went between places (n, 2), along its way: whatever noise adds to a length."""
+    """Return how far (n - 1,) [m] a robot went between places (n, 2), along its way: noise adds to a length."""
     last = len(places) - 1
     rows = np.arange(last)
     ahead = places[np.minimum(rows + 1 + _BESIDE, last)] - places[np.maximum(rows - _BESIDE, 0)]

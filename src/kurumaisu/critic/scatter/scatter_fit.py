@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from operator import attrgetter
 
 import numpy as np
 
@@ -38,18 +39,20 @@ _OTHER = 2.0
 
 @dataclass(frozen=True)
 class RoughFit:
-    """An effect with the best of some sizes of its parameters, and the misfit then."""
+    """An effect of a form with the best of some sizes of its parameters, and the misfit then."""
 
     low: float
     effect: type[Mechanism]
+    form: Mapping[str, float]
     values: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class StatisticsChange:
-    """What a parameter at a value does to the statistics."""
+    """What a parameter at a value does to the statistics, with an effect of a form."""
 
     effect: type[Mechanism]
+    form: Mapping[str, float]
     name: str
     value: float
     change: FloatArray
@@ -110,8 +113,8 @@ class ScatterFit:
     def pushes(self) -> Iterator[StatisticsChange]:
         """Yield what each parameter alone does to the statistics, at some values, the largest last."""
         plain = self._numbers((), 1)
-        for effect in self.candidates(set()):
-            null = self._simulate.null(effect)
+        for effect, form in [(one, form) for one in self.candidates(set()) for form in self._forms(one)]:
+            null = {**self._simulate.null(effect), **form}
             for p in self._parameters(effect):
                 found: list[StatisticsChange] = []
                 least = 0.0
@@ -120,7 +123,7 @@ class ScatterFit:
                     if np.array_equal(moved, plain):
                         least = value
                         break  # it only shapes what others do, or does nothing when it is smaller
-                    found.append(StatisticsChange(effect, p.name, value, moved - plain))
+                    found.append(StatisticsChange(effect, form, p.name, value, moved - plain))
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
@@ -135,7 +138,7 @@ class ScatterFit:
         Where readings pile up is known to a step of them: from half or twice as far off no small step leads there.
         """
         known = {least: plain, **{push.value: plain + push.change for push in found}}
-        null = self._simulate.null(found[0].effect)
+        null = {**self._simulate.null(found[0].effect), **found[0].form}
         for low, high in pairwise(sorted(known)):
             off, end = (self.likeness.places_off(known[value]) for value in (low, high))
             for place in np.flatnonzero(off * end < 0):
@@ -157,6 +160,11 @@ class ScatterFit:
             if asked and effect not in without and effect.stage > LaserStage.GEOMETRY and self._parameters(effect):
                 yield effect
 
+    def _forms(self, effect: type[Mechanism]) -> Sequence[Mapping[str, float]]:
+        """Return the forms of an effect that do not act on the mean."""
+        free = [form for form in effect.forms if not any(f"{effect.id}.{name}" in self._means for name in form)]
+        return free or ({},)
+
     def _parameters(self, effect: type[Mechanism]) -> list[Parameter]:
         known = self._means | {f"{effect.id}.{name}" for name in effect.usual()}
         return [p for p in effect.parameters if f"{effect.id}.{p.name}" not in known]
@@ -177,7 +185,14 @@ class ScatterFit:
         return self.likeness.cost(self.statistics(settings, (1, 2)))
 
     def rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
-        """Return the best of some sizes of an effect's parameters, as if changes of the statistics were sums."""
+        """Return the best of an effect's forms and some sizes, as if changes of the statistics were sums."""
+        forms = list({tuple(push.form.items()): push.form for push in pushes}.values())
+        return min(
+            (self._rough([push for push in pushes if push.form == form], at) for form in forms), key=attrgetter("low")
+        )
+
+    def _rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
+        """Return the best of some sizes of one form's parameters."""
         low, best = np.inf, dict[str, float]()
         for name in dict.fromkeys(push.name for push in pushes):
             known = at + sum(push.change for push in pushes if best.get(push.name) == push.value)
@@ -185,7 +200,7 @@ class ScatterFit:
                 misfit = self.likeness.cost(known + push.change) if push.name == name else np.inf
                 if misfit < low - _FREE:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
-        return RoughFit(low, pushes[0].effect, best)
+        return RoughFit(low, pushes[0].effect, pushes[0].form, best)
 
     def halves(
         self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
@@ -208,7 +223,7 @@ class ScatterFit:
 
     def plain(self, start: RoughFit) -> ScatterPiece:
         """Return an effect of such sizes, nothing fitted yet."""
-        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.values})
+        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
         return ScatterPiece(start.effect, setting, tuple(start.values), 0.0, 0.0)
 
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu import effects
-from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece, StatisticsChange
 from kurumaisu.critic.values.prior import log_prior, occam
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.effects import Mechanism
@@ -46,10 +47,6 @@ class ScatterEffect:
     nats: float
     sds: Mapping[str, tuple[float, float]]
     rivals: Mapping[str, float]
-
-
-def _low(rough: RoughFit) -> float:
-    return rough.low
 
 
 def _cost(fitted: tuple[list[ScatterPiece], float]) -> float:
@@ -135,7 +132,7 @@ class ScatterSearch:
             effect: [push for push in pushes if push.effect is effect] for effect in self._fit.candidates(without)
         }
         starts = [self._fit.rough(own, at) for own in by_effect.values() if own]
-        starts = sorted((start for start in starts if start.low < here), key=_low)
+        starts = sorted((start for start in starts if start.low < here), key=attrgetter("low"))
         tried: list[ScatterPiece] = []
         for start in starts[:_REFITS]:
             if here - start.low < _CLOSE * (here - starts[0].low):

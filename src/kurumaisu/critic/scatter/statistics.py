@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends, inside_ends, without_cut_off
+from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_off_ends, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
@@ -30,6 +30,7 @@ _KEPT = 4  # fits of all scans, one for each place at which readings are cut off
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
 _PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
+_ALL = 0.95  # of the readings that ought to lie beyond an end and have no return, if they are cut off there
 _GRID = 1e-3  # [m] to which readings are rounded before their values are counted
 _AMID = (0.1, 0.9)  # quantiles of readings between which walls are everywhere
 _JUMP = 0.15  # [m] between the two sides of an edge, at least
@@ -186,7 +187,12 @@ class Statistics:
 
     def _ends(self, readings: FloatArray) -> tuple[float, float]:
         """Return where readings (k, b) are cut off [m], those included that are too far out to be trusted."""
-        return cut_off_ends(readings[self._read])
+        low, high = cut_off_ends(readings[self._read])
+        said = readings[self._read & np.isfinite(readings)]
+        farthest = float(said.max()) if len(said) else np.inf
+        beyond = np.isinf(readings[self._read & (self._base > farthest + GATE)])
+        lost = len(beyond) >= PILED and beyond.mean() > _ALL
+        return low, farthest if lost and not np.isfinite(high) else high
 
     def _piles(self, ends: tuple[float, float]) -> list[float]:
         """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""

@@ -16,8 +16,8 @@ _BESIDE = 0.025  # [rad] on each side of a corner or jump, a beam at least: erro
 # [rad] oblique beyond this, a beam slides along the wall with every error of the pose, which then acts by its square,
 # too; and what becomes of a footprint four times as long as wide is another equation for everybody.
 _STEEPEST = np.radians(75.0)
-_GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
-_PILED = 20  # readings of one value, the least or the greatest, that are a pile if they are
+GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
+PILED = 20  # readings of one value, the least or the greatest, that are a pile if they are
 _HIGHER = 3  # times as many as any value has that lies within the gate beside them
 _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
@@ -48,7 +48,7 @@ def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 
 
     reach [m]: as of edges.
     """
-    inside = (base > shots.laser.range_min + _GATE) & (base < shots.laser.range_max - _GATE)
+    inside = (base > shots.laser.range_min + GATE) & (base < shots.laser.range_max - GATE)
     beside = edges(seen, shots.laser.angle_increment, reach)
     return np.asarray(inside & ~beside & (seen.incidence < _STEEPEST))
 
@@ -65,7 +65,7 @@ def inside_ends(base: FloatArray, ends: tuple[float, float], doubt: FloatArray |
     doubt [m]: by how much they may be read elsewhere, where that is more than a gate.
     """
     low, high = ends
-    gate = np.maximum(_GATE, doubt)
+    gate = np.maximum(GATE, doubt)
     return np.asarray((base > low + gate) & (base < high - gate))
 
 
@@ -78,7 +78,7 @@ def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
     ends = []
     for sign in (-1.0, 1.0):
         off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
-        grids = [grid for grid in _GRIDS if _piled(off[off < _GATE], grid)]
+        grids = [grid for grid in _GRIDS if _piled(off[off < GATE], grid)]
         within = float(np.max(off[off < grids[0]])) if grids else np.inf
         ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
     return ends[0], ends[1]
@@ -87,7 +87,7 @@ def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
 def _piled(off: FloatArray, grid: float) -> bool:
     """Return whether readings pile up at an end; off (n,) [m]: how far each lies inside of it."""
     counts = np.bincount((off / grid).astype(np.int64), minlength=2)
-    return bool(counts[0] > max(_PILED, _HIGHER * counts[1:].max()))
+    return bool(counts[0] > max(PILED, _HIGHER * counts[1:].max()))
 
 
 def without_cut_off(readings: FloatArray, ends: tuple[float, float] | None = None) -> FloatArray:
