@@ -89,6 +89,21 @@ def test_rows_are_in_the_order_of_the_queries(tmp_path):
     assert lines[683].split(",")[5] == "nan"  # nothing drove it
 
 
+def test_where_the_pose_decides_which_wall_a_beam_meets_either_is_expected(tmp_path):
+    """Beside edges: readings of the wall that the map alone would not tell are within the deviation."""
+    data, truth = withheld(recording(tmp_path, None, 0.0, 5, scans=48), every=2)
+    rng = np.random.default_rng(5)
+    moved = []
+    for run in data.runs:  # a reference that knows places to 2 cm
+        values = run.pose.values + np.array([0.02, 0.02, 0.01]) * rng.standard_normal(run.pose.values.shape)
+        moved.append(replace(run, pose=replace(run.pose, values=values)))
+    means, sds = predicted(replace(data, runs=tuple(moved), truth=(0.02, 0.01)))
+    z = (truth - means) / sds
+    other = np.isfinite(z) & (np.abs(truth - means) > 0.15)  # m: of another wall
+    assert 20 < np.count_nonzero(other) < 0.05 * other.size
+    assert (np.abs(z[other]) < 6).mean() > 0.97
+
+
 def test_at_a_stop_the_scans_before_tell_how_far_the_pose_is_off(tmp_path):
     """Of scans after t0 nothing is used: of a stop's first scan nobody knows more than its pose."""
     data = make(Ask("null", design="room", family="laser", regime="usual"), 2, tmp_path).null

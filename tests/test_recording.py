@@ -157,6 +157,38 @@ def test_a_swapped_pair_of_rows_is_sorted_and_told(folder):
     assert recording.invalid == ()
 
 
+def test_a_row_that_came_late_is_sorted_however_slow_the_sensor(folder):
+    """A scan of a laser of 1 Hz: it stands a second behind, and fills the hole that it left."""
+    whole = read_recording(folder).runs[0]
+    path = folder / "run_1" / "scan.csv"
+    head, *rows = lines_of(path)
+    slow = [row.split(",", 1) for row in rows]
+    slow = [f"{float(slow[0][0]) + i!r},{rest}" for i, (_, rest) in enumerate(slow)]
+    rewrite(path, [head, *slow])
+    straight = read_recording(folder).runs[0].scan
+    for late in ([4, 6, 5], [4, 6, 7, 5]):  # by one scan, by two
+        order = [*range(4), *late, *range(max(late) + 1, len(slow))]
+        rewrite(path, [head, *(slow[i] for i in order)])
+        recording = read_recording(folder)
+        assert recording.invalid == ()
+        np.testing.assert_array_equal(recording.runs[0].scan.t, straight.t)
+        np.testing.assert_array_equal(recording.runs[0].scan.values, whole.scan.values)
+
+
+@pytest.mark.parametrize("off", [-3.0, 3.0])
+def test_one_wrong_stamp_costs_one_row(folder, off):
+    whole = read_recording(folder).runs[0]
+    path = folder / "run_1" / "pose.csv"
+    head, *rows = lines_of(path)
+    cells = [row.split(",") for row in rows]
+    cells[50][0] = repr(float(cells[50][0]) + off)
+    rewrite(path, [head, *map(",".join, cells)])
+    recording = read_recording(folder)
+    assert recording.invalid == ()
+    assert any("pose.csv: 1 row is stamped out of turn: dropped (first: line 52, " in one for one in recording.problems)
+    np.testing.assert_array_equal(recording.runs[0].pose.t, np.delete(whole.pose.t, 50))
+
+
 @pytest.mark.parametrize("fault", ["reset", "shuffled", "conflict", "no numbers"])
 def test_a_clock_that_cannot_be_trusted_forbids_a_verdict(folder, fault):
     path = folder / "run_1" / "pose.csv"

@@ -29,7 +29,7 @@ from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
-GENERATORS = ("cliff", "dune", "heath", "motors")
+GENERATORS = ("cliff", "fen", "heath", "motors")
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 _Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
 _NAMED = 0.9
@@ -103,7 +103,7 @@ class Job:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table of one generator."""
     parser = argparse.ArgumentParser(prog="scripts/bench strangers", description=__doc__)
-    parser.add_argument("--generator", choices=GENERATORS, default="heath")
+    parser.add_argument("--generator", choices=GENERATORS, default="fen")
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--draws", type=int, default=20, help="recordings of each kind")
     parser.add_argument("--seed", type=int, default=1000)

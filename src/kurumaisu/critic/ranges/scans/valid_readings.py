@@ -20,7 +20,7 @@ GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 PILED = 20  # readings of one value, the least or the greatest, that are a pile if they are
 _HIGHER = 3  # times as many as any value has that lies within the gate beside them
 _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
-_GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
+_GRIDS = (1e-3, 4e-3, 16e-3)  # [m] within which values are one; a cut-off need not be sharp
 
 
 def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
