@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.judge.clock_drift import by_its_clock
+from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.values.verdict import Cause, Estimate
-from kurumaisu.params import load_model, shipped
+from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 FAST = 0.005
@@ -53,3 +53,12 @@ def test_a_laser_whose_own_clock_drifts_keeps_it(tmp_path):
     assert "laser.clock_skew" in {cause.id for cause in finding.causes}
     other = Cause("base.clock_scale", 1.0, {"scale": Estimate(FAST / 3, 0.0, 0.01, "1")}, 100.0)
     assert by_its_clock([other], finding, data, MODEL, look) == (finding, data)
+
+
+def test_what_the_commands_clock_has_no_need_of_is_left_out():
+    settings = (
+        EffectSetting("base.clock_scale", {"scale": FAST, "through": 0.0}),
+        EffectSetting("base.marker_x", {"x": 0.1}),
+        EffectSetting("base.gain_v", {"gain": 0.1}),
+    )
+    assert by_commands(settings, MODEL) == settings[1:]

@@ -12,7 +12,14 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_off_ends, inside_ends, without_cut_off
+from kurumaisu.critic.ranges.scans.valid_readings import (
+    GATE,
+    PILED,
+    cut_off_ends,
+    cut_offs,
+    inside_ends,
+    without_cut_off,
+)
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
@@ -113,7 +120,7 @@ class Statistics:
         out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
         said = readings[self._trust]
         values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
-        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(ends)])
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(readings, ends)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
@@ -194,9 +201,10 @@ class Statistics:
         lost = len(beyond) >= PILED and beyond.mean() > _ALL
         return low, farthest if lost and not np.isfinite(high) else high
 
-    def _piles(self, ends: tuple[float, float]) -> list[float]:
-        """Return the ends [m] at which readings are cut off, in units in which a step of them matters to nobody."""
-        low, high = ends
+    def _piles(self, readings: FloatArray, ends: tuple[float, float]) -> list[float]:
+        """Return where [m] readings are cut off, in units in which a step matters to nobody; ends: without a pile."""
+        places = zip(cut_offs(readings[self._read]), ends, strict=True)
+        low, high = (pile if np.isfinite(pile) else end for pile, end in places)
         return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
 
     def _leftover(

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,9 @@ GATE = 0.1  # [m] from the ends of the gate: nearer ones are cut off one-sidedly
 PILED = 20  # readings of one value, the least or the greatest, that are a pile if they are
 _HIGHER = 3  # times as many as any value has that lies within the gate beside them
 _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
-_GRIDS = (1e-3, 4e-3, 16e-3)  # [m] within which values are one; a cut-off need not be sharp
+_GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
+# [m] likewise at the far end, up to which others come, as readings scatter; at the near one something may ride.
+_WIDEST = 32e-3
 
 
 def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
@@ -74,20 +77,30 @@ def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
 
     Of a pile that is not sharp, the end that lies inside.
     """
-    values = readings[np.isfinite(readings)]
-    ends = []
+    low, high = (float(pile.min()) if len(pile) else np.inf for pile in _piles(readings))
+    return -low, high
+
+
+def cut_offs(readings: FloatArray) -> tuple[float, float]:
+    """Return the middles [m] of the piles of the least and the greatest readings; infinite where there is none."""
+    low, high = (float(np.median(pile)) if len(pile) else np.inf for pile in _piles(readings))
+    return -low, high
+
+
+def _piles(readings: FloatArray) -> Iterator[FloatArray]:
+    """Yield the readings (n,) [m] that pile up as the least, their sign changed, and as the greatest; none: (0,)."""
     for sign in (-1.0, 1.0):
-        off = np.round(np.max(sign * values) - sign * values if len(values) else values, _MICRON)
-        grids = [grid for grid in _GRIDS if _piled(off[off < GATE], grid)]
-        within = float(np.max(off[off < grids[0]])) if grids else np.inf
-        ends.append(sign * (float(np.max(sign * values)) - within) if grids else sign * np.inf)
-    return ends[0], ends[1]
+        values = sign * readings[np.isfinite(readings)]
+        off = np.round(np.max(values) - values if len(values) else values, _MICRON)
+        grids = _GRIDS if sign < 0 else (*_GRIDS, _WIDEST)
+        grid = next((grid for grid in grids if _piled(off[off < GATE], grid)), 0.0)
+        yield values[off < grid]
 
 
 def _piled(off: FloatArray, grid: float) -> bool:
     """Return whether readings pile up at an end; off (n,) [m]: how far each lies inside of it."""
     counts = np.bincount((off / grid).astype(np.int64), minlength=2)
-    return bool(counts[0] > max(PILED, _HIGHER * counts[1:].max()))
+    return bool(counts[0] > max(PILED, _HIGHER * counts[1:].max()) and (grid < _WIDEST or counts[1:].any()))
 
 
 def without_cut_off(readings: FloatArray, ends: tuple[float, float] | None = None) -> FloatArray:
