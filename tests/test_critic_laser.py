@@ -2,6 +2,7 @@
 """The laser's criticism on scans that share no code with the effects, on nulls, and on a real sensor."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -224,3 +225,16 @@ def test_one_more_effect_that_nobody_knows_is_no_rival():
     p, confounded = confusion(weights, frozenset("a"), "abc")
     assert p["c"] == pytest.approx(0.21)
     assert confounded == (("a", "b"),)
+
+
+def test_of_some_ten_readings_nothing_is_said(tmp_path):
+    """As where all walls of a map are stairs: most beams meet an edge."""
+    data = recording(tmp_path, "laser.offset", 0.05, 4, scans=12)
+    (run,) = data.runs
+    values = np.full(run.scan.values.shape, np.nan)
+    values[:, ::60] = run.scan.values[:, ::60]
+    few = replace(data, runs=(replace(run, scan=replace(run.scan, values=values)),))
+    finding = criticise_scans(few, MODEL, say)
+    assert not finding.causes
+    assert finding.refused is not None
+    assert re.match(r"only \d+ of \d+ readings of walls are away from edges of the map, fewer than", finding.refused)

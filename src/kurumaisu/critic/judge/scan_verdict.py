@@ -48,6 +48,8 @@ from kurumaisu.types import FloatArray
 
 MATERIAL = 1e-4  # [m] change, of the readings that it changes, below which an effect does not matter: a tenth of a step
 
+_FEWEST = 200  # readings that tell anything: forty numbers of their scatter, five of each
+
 
 @dataclass(frozen=True)
 class _Question:
@@ -81,6 +83,8 @@ def criticise_scans(
     assembly = Assembly(gather_stands(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
+    if normal.readings < _FEWEST:
+        return LaserFinding(refused=_too_few(assembly, normal), details=repeatability.sentences(recording, model))
     if (far := large_effect(assembly.shots, ids)) is not None:
         return _large_effect_first(question, assembly, normal, far)
     progress("laser: comparing effects")
@@ -105,6 +109,15 @@ def criticise_scans(
         progress("laser: it is elsewhere than the reference says")
         return criticise_scans(recording, model, progress, ids, posed=True)
     return _with_scatter(question, MeanFit(assembly, normal, made, fit))
+
+
+def _too_few(assembly: Assembly, normal: NormalEquations) -> str:
+    """Return why scans say nothing: what their beams meet."""
+    met = int(np.count_nonzero(np.isfinite(assembly.shots.measured) & np.isfinite(assembly.marks.seen.ranges)))
+    return (
+        f"only {normal.readings} of {met} readings of walls are away from edges of the map, fewer than the {_FEWEST} "
+        "that tell anything. Walls askew in a map of pixels are stairs, all edges: draw them as polygons"
+    )
 
 
 def _large_effect_first(
