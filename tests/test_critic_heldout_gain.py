@@ -24,9 +24,12 @@ from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
 from kurumaisu.critic.heldout.corrected_scans import corrected
 from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
+from kurumaisu.critic.judge.merge import refuted, with_scans
 from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
+    Cause,
     Gain,
     LogDensityGain,
     RmseGain,
@@ -218,13 +221,29 @@ def test_a_laser_alone_gives_the_overall_gain(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
     right = (EffectSetting("laser.scale", {"scale": 0.01}),)
     alone = replace(bare(), verdict=Verdict("none"))
-    out = with_scan_gain(alone, data, Extension(None, right, lambda _: ()))
+    worth = scan_gain.measure(data, MODEL, None, right)
+    out = with_scan_gain(alone, worth)
     whole = out.verdict.gain
     assert whole.log_density_per_sample == whole.channels["range"].log_density_per_sample
     assert "nats per reading" in out.story.details[-1]
-    beside = with_scan_gain(bare(), data, Extension(None, right, lambda _: ()))
+    beside = with_scan_gain(bare(), worth)
     assert beside.verdict.gain.log_density_per_sample == NONE
-    assert with_scan_gain(alone, data, Extension(None, (), lambda _: ())) == alone
+    assert scan_gain.measure(data, MODEL, None, ()) is None
+    assert with_scan_gain(alone, None) == alone
+
+
+def test_what_scans_held_out_refuse_is_not_told(tmp_path):
+    data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
+    wrong = (EffectSetting("laser.scale", {"scale": -0.01}),)
+    worth = scan_gain.measure(replace(data, test=data.train), MODEL, None, wrong)
+    assert worth.log_density_per_sample.hi90 < 0
+    cause = Cause("laser.scale", 1.0, {}, 30.0)
+    left = refuted(LaserFinding((cause,), settings=wrong, details=("first",)), worth)
+    assert (left.causes, left.settings, left.details[0]) == ((), (), "first")
+    assert left.details[1].startswith("laser: laser.scale explain")
+    told = with_scans(replace(bare(), verdict=Verdict("none")), left)
+    assert told.verdict.verdict == "none"
+    assert told.settings == ()
 
 
 def test_a_verdict_of_before_is_still_read(tmp_path):

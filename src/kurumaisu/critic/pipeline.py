@@ -10,12 +10,13 @@ from kurumaisu.critic.base.drive import driven
 from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
-from kurumaisu.critic.heldout.extension_gain import with_gains
+from kurumaisu.critic.heldout import scan_gain
+from kurumaisu.critic.heldout.extension_gain import with_scan_gain, with_slam
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
-from kurumaisu.critic.judge.merge import with_scans
+from kurumaisu.critic.judge.merge import refuted, with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
@@ -71,12 +72,19 @@ def criticise(
 
     seen, stamped = by_its_clock(found.verdict.causes, scans, recording, model, again)
     scans, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
-    found = with_scans(found, scans)
     forecast = extension.forecast
     if forecast is not None and stamped is not recording:
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
     stamped = with_elapsed_time(stamped)
-    found = with_gains(found, stamped, replace(extension, forecast=forecast, scans=settings), progress, slam=slam)
+    progress("measuring the gain on held-out scans")
+    worth = scan_gain.measure(stamped, model, forecast, settings)
+    if worth is not None and scans.settings and worth.log_density_per_sample.hi90 < 0:
+        settings = tuple(each for each in settings if each not in scans.settings)
+        scans, worth = refuted(scans, worth), None
+    found = with_scan_gain(with_scans(found, scans), worth)
+    if slam:
+        progress("running SLAM with both models")
+        found = with_slam(found, stamped, replace(extension, forecast=forecast, scans=settings))
     found = with_robot(found, recording)
     if not predictions.asked(recording):
         return found

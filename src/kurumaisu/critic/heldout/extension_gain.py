@@ -11,7 +11,6 @@ from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.story import Overlay
@@ -35,21 +34,8 @@ class Extension:
         return not self.scans and (self.forecast is None or not self.forecast.settings)
 
 
-def with_gains(
-    criticism: Criticism, recording: Recording, extension: Extension, progress: Progress, *, slam: bool
-) -> Criticism:
-    """Return a criticism with what its extension gains on scans held out and, if asked for, downstream in SLAM."""
-    progress("measuring the gain on held-out scans")
-    criticism = with_scan_gain(criticism, recording, extension)
-    if slam:
-        progress("running SLAM with both models")
-        criticism = with_slam(criticism, recording, extension)
-    return criticism
-
-
-def with_scan_gain(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
-    """Return a criticism with the gain of what its settings for the laser do."""
-    measured = scan_gain.measure(recording, criticism.model, extension.forecast, extension.scans)
+def with_scan_gain(criticism: Criticism, measured: ChannelGain | None) -> Criticism:
+    """Return a criticism with what its settings for the laser gain on scans held out, None where nobody knows."""
     if measured is None:
         return criticism
     gain = criticism.verdict.gain or Gain(measured.log_density_per_sample)

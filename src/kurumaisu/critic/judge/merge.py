@@ -8,8 +8,8 @@ from dataclasses import replace
 from kurumaisu.critic.experiment.proposal import LISTED_IDS
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding
-from kurumaisu.critic.values.verdict import Kind, Verdict
+from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.verdict import ChannelGain, Kind, Verdict
 
 _NOTHING_SAID = "none"
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
@@ -66,6 +66,22 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
         noise=(*story.noise, *shown.noise),
     )
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
+
+
+def refuted(finding: LaserFinding, worth: ChannelGain) -> LaserFinding:
+    """Return a finding without what predicts scans held out worse than the model does, which is chance's."""
+    density = worth.log_density_per_sample
+    named = ", ".join(sorted({setting.id for setting in finding.settings}))
+    words = (
+        f"laser: {named} explain the scans that they were found in, but on scans held out they lose "
+        f"{-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), so they are not told."
+    )
+    return LaserFinding(
+        details=(*finding.details, words),
+        pictures=Pictures(noise=finding.pictures.noise),
+        small=finding.small,
+        next_experiment=finding.next_experiment,
+    )
 
 
 def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:

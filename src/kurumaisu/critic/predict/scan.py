@@ -19,12 +19,14 @@ from kurumaisu.types import BoolArray, FloatArray
 _START = (1.0, 1.0, 1.0, 3e-4)  # factors on the laser's own deviation, on the doubt of the pose; common to all [m]
 _SPREAD = (0.4, 1.0, 1.0, 1.5)  # of their natural logarithms, 1 sd: how far from there they remain plausible
 _MOVE = np.array([0.006, 0.006, 0.006])  # [m, m, rad] by which poses are moved to see what their errors do
-_DRAWS, _WIDER = 128, 2.0  # poses that are tried for what a beam meets, and how much wider than likely they are drawn
+_WIDER = 2.0  # times as wide as poses are likely, those are drawn that are tried for what a beam meets
+_DRAWS, _LOOKS = (16, 128), 4096  # so many of each scan, at least and at most, and so many in all
 OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
 _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
 _FEWEST = 50  # readings
 _LEAST = 1e-4  # [m]
+_SURE = 1e-5  # [m, rad] no pose is known better
 
 
 @dataclass(frozen=True)
@@ -57,19 +59,18 @@ class ScanModel:
         settings = without_random(shots, self.settings)
         around = shifted_hits(shots, settings)
         mean, sd = self.of(expected_from(shots, settings, around))
-        moves = np.random.default_rng(0).normal(0.0, _WIDER, (_DRAWS, 3))
-        weights = np.exp(-0.5 * np.sum(moves**2 * (1 - _WIDER**-2), axis=1))
         place = (doubts(shots) * self.factors[[1, 1, 2]])[:, np.newaxis]
-        looks = [
-            predict(shots, settings, hits_of(shots, settings, 0, shift=m * place, like=around[0]), 0) for m in moves
-        ]
-        off = np.array(looks) - mean
-        weighed = np.where(np.isfinite(off), weights[:, np.newaxis, np.newaxis], 0.0)
-        weighed /= np.maximum(weighed.sum(axis=0), 1e-9)
-        off = np.nan_to_num(off)
-        drift = np.sum(weighed * off, axis=0)
-        spread = np.sqrt(np.sum(weighed * (off - drift) ** 2, axis=0))
-        jumps = (np.abs(off) > OUTLIER * sd).any(axis=0) & (spread > sd)
+        total, first, second, farthest = np.zeros((4, *mean.shape))
+        for move in np.random.default_rng(0).normal(0.0, _WIDER, (_draws(len(mean)), 3)):
+            weight = float(np.exp(-0.5 * move @ move * (1 - _WIDER**-2)))
+            hits = hits_of(shots, settings, 0, shift=move * place, like=around[0])
+            off = predict(shots, settings, hits, 0) - mean
+            seen, off = weight * np.isfinite(off), np.nan_to_num(off)
+            total, first, second = total + seen, first + seen * off, second + seen * off**2
+            farthest = np.maximum(farthest, np.abs(off))
+        drift = first / np.maximum(total, 1e-9)
+        spread = np.sqrt(np.maximum(second / np.maximum(total, 1e-9) - drift**2, 0.0))
+        jumps = (farthest > OUTLIER * sd) & (spread > sd)
         return np.where(jumps, mean + drift, mean), np.where(jumps, np.hypot(sd, spread), sd)
 
     def of(self, what: Expected) -> tuple[FloatArray, FloatArray]:
@@ -111,9 +112,13 @@ def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Seque
     return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
 
 
+def _draws(scans: int) -> int:
+    return int(np.clip(_LOOKS // max(scans, 1), *_DRAWS))
+
+
 def doubts(shots: Shots) -> FloatArray:
     """Return what the pose of each scan may be off, (k, 3) [m, m, rad]."""
-    return np.array([shots.tracks[i].doubt for i in shots.run.tolist()])[:, [0, 0, 1]]
+    return np.maximum([shots.tracks[i].doubt for i in shots.run.tolist()], _SURE)[:, [0, 0, 1]]
 
 
 def without_random(shots: Shots, settings: Sequence[EffectSetting]) -> Sequence[EffectSetting]:
