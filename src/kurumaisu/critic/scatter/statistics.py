@@ -194,7 +194,7 @@ class Statistics:
 
     def _ends(self, readings: FloatArray) -> tuple[float, float]:
         """Return where readings (k, b) are cut off [m], those included that are too far out to be trusted."""
-        low, high = cut_off_ends(readings[self._read])
+        low, high = cut_off_ends(readings[self._read], self._base[self._read])
         said = readings[self._read & np.isfinite(readings)]
         farthest = float(said.max()) if len(said) else np.inf
         beyond = np.isinf(readings[self._read & (self._base > farthest + GATE)])
@@ -203,7 +203,7 @@ class Statistics:
 
     def _piles(self, readings: FloatArray, ends: tuple[float, float]) -> list[float]:
         """Return where [m] readings are cut off, in units in which a step matters to nobody; ends: without a pile."""
-        places = zip(cut_offs(readings[self._read]), ends, strict=True)
+        places = zip(cut_offs(readings[self._read], self._base[self._read]), ends, strict=True)
         low, high = (pile if np.isfinite(pile) else end for pile, end in places)
         return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
 

@@ -22,8 +22,8 @@ PILED = 20  # readings of one value, the least or the greatest, that are a pile 
 _HIGHER = 3  # times as many as any value has that lies within the gate beside them
 _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, however they were rounded
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
-# [m] likewise at the far end, up to which others come, as readings scatter; at the near one something may ride.
-_WIDEST = 32e-3
+_WIDEST = 32e-3  # [m] likewise, as readings scatter, at a far end where the map has most walls beyond
+_BEYOND = 0.5  # share of a pile that most are
 
 
 def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
@@ -58,7 +58,7 @@ def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 
 
 def usable_readings(shots: Shots, seen: BeamHits, base: FloatArray) -> BoolArray:
     """Return (k, b) which readings may speak about the mean, outliers aside."""
-    inside = inside_ends(base, cut_off_ends(shots.measured))
+    inside = inside_ends(base, cut_off_ends(shots.measured, base))
     return np.asarray(usable_beams(shots, seen, base) & inside & np.isfinite(shots.measured))
 
 
@@ -72,35 +72,38 @@ def inside_ends(base: FloatArray, ends: tuple[float, float], doubt: FloatArray |
     return np.asarray((base > low + gate) & (base < high - gate))
 
 
-def cut_off_ends(readings: FloatArray) -> tuple[float, float]:
+def cut_off_ends(readings: FloatArray, expected: FloatArray | None = None) -> tuple[float, float]:
     """Return the least and the greatest reading [m] where readings pile up there, as if cut off; else infinite ones.
 
-    Of a pile that is not sharp, the end that lies inside.
+    expected [m]: readings as the map has them, which tell a far end that is not sharp. Of that, what lies inside.
     """
-    low, high = (float(pile.min()) if len(pile) else np.inf for pile in _piles(readings))
+    low, high = (float(pile.min()) if len(pile) else np.inf for pile in _piles(readings, expected))
     return -low, high
 
 
-def cut_offs(readings: FloatArray) -> tuple[float, float]:
+def cut_offs(readings: FloatArray, expected: FloatArray) -> tuple[float, float]:
     """Return the middles [m] of the piles of the least and the greatest readings; infinite where there is none."""
-    low, high = (float(np.median(pile)) if len(pile) else np.inf for pile in _piles(readings))
+    low, high = (float(np.median(pile)) if len(pile) else np.inf for pile in _piles(readings, expected))
     return -low, high
 
 
-def _piles(readings: FloatArray) -> Iterator[FloatArray]:
+def _piles(readings: FloatArray, expected: FloatArray | None) -> Iterator[FloatArray]:
     """Yield the readings (n,) [m] that pile up as the least, their sign changed, and as the greatest; none: (0,)."""
+    known = np.isfinite(readings)
     for sign in (-1.0, 1.0):
-        values = sign * readings[np.isfinite(readings)]
+        values = sign * readings[known]
         off = np.round(np.max(values) - values if len(values) else values, _MICRON)
-        grids = _GRIDS if sign < 0 else (*_GRIDS, _WIDEST)
-        grid = next((grid for grid in grids if _piled(off[off < GATE], grid)), 0.0)
+        grid = next((grid for grid in _GRIDS if _piled(off[off < GATE], grid)), 0.0)
+        if not grid and sign > 0 and expected is not None and _piled(off[off < GATE], _WIDEST):
+            beyond = expected[known][off < _WIDEST] > values.max(initial=-np.inf)
+            grid = _WIDEST if beyond.mean() > _BEYOND else 0.0
         yield values[off < grid]
 
 
 def _piled(off: FloatArray, grid: float) -> bool:
     """Return whether readings pile up at an end; off (n,) [m]: how far each lies inside of it."""
     counts = np.bincount((off / grid).astype(np.int64), minlength=2)
-    return bool(counts[0] > max(PILED, _HIGHER * counts[1:].max()) and (grid < _WIDEST or counts[1:].any()))
+    return bool(counts[0] > max(PILED, _HIGHER * counts[1:].max()))
 
 
 def without_cut_off(readings: FloatArray, ends: tuple[float, float] | None = None) -> FloatArray:

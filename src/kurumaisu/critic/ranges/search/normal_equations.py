@@ -40,7 +40,13 @@ from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
 from kurumaisu.critic.ranges.scans.map_changes import map_change
 from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
 from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
-from kurumaisu.critic.ranges.scans.valid_readings import pose_weights, usable_beams, usable_readings, without_cut_off
+from kurumaisu.critic.ranges.scans.valid_readings import (
+    cut_off_ends,
+    pose_weights,
+    usable_beams,
+    usable_readings,
+    without_cut_off,
+)
 from kurumaisu.critic.ranges.signals.coefficient_blocks import blocks
 from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns, Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily
@@ -82,7 +88,7 @@ class Assembly:
         self._linearise(shots, roughly=True)
         self.motion: list[MotionEvidence] | None = None
         self.blocked = blocked_beams(shots.measured, self.marks.base)
-        somewhere = without_cut_off(shots.measured)
+        somewhere = without_cut_off(shots.measured, cut_off_ends(shots.measured, self.marks.base))
         self.map_change = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
