@@ -34,6 +34,7 @@ from kurumaisu.critic.values.verdict import (
     LogDensityGain,
     RmseGain,
     SlamGain,
+    Unknown,
     Verdict,
     read_verdict,
     verdict_text,
@@ -238,7 +239,10 @@ def test_what_scans_held_out_refuse_is_not_told(tmp_path):
     worth = scan_gain.measure(replace(data, test=data.train), MODEL, None, wrong)
     assert worth.log_density_per_sample.hi90 < 0
     cause = Cause("laser.scale", 1.0, {}, 30.0)
-    left = refuted(LaserFinding((cause,), settings=wrong, details=("first",)), worth)
+    turned, curve = (Unknown(channel, "w", "bump", 0.9) for channel in ("reference.heading", "laser.bias"))
+    finding = LaserFinding((cause,), unknown=(turned, curve), settings=wrong, details=("first",))
+    assert refuted(finding, worth).unknown == (turned,)
+    left = refuted(replace(finding, unknown=()), worth)
     assert (left.causes, left.settings, left.details[0]) == ((), (), "first")
     assert left.details[1].startswith("laser: laser.scale explain")
     told = with_scans(replace(bare(), verdict=Verdict("none")), left)

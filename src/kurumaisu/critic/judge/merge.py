@@ -69,7 +69,10 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
 
 
 def refuted(finding: LaserFinding, worth: ChannelGain) -> LaserFinding:
-    """Return a finding without what predicts scans held out worse than the model does, which is chance's."""
+    """Return a finding without what predicts scans held out worse than the model does, which is chance's.
+
+    What extends no model, an error of the reference's poses, was not asked of them, and stays.
+    """
     density = worth.log_density_per_sample
     named = ", ".join(sorted({setting.id for setting in finding.settings}))
     words = (
@@ -77,6 +80,7 @@ def refuted(finding: LaserFinding, worth: ChannelGain) -> LaserFinding:
         f"{-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), so they are not told."
     )
     return LaserFinding(
+        unknown=tuple(each for each in finding.unknown if each.channel in _POSES),
         details=(*finding.details, words),
         pictures=Pictures(noise=finding.pictures.noise),
         small=finding.small,
