@@ -15,7 +15,6 @@ from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.valid_readings import (
     GATE,
     PILED,
-    cut_off_ends,
     cut_offs,
     inside_ends,
     without_cut_off,
@@ -103,7 +102,7 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        ends = self._ends(readings)
+        ends, places = self._ends(readings)
         left, common = self._leftover(error, ends)
         inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
@@ -120,14 +119,14 @@ class Statistics:
         out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
         said = readings[self._trust]
         values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
-        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(readings, ends)])
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(places)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
 
         readings, error: as of `of`.
         """
-        left, _ = self._leftover(error, self._ends(readings))
+        left, _ = self._leftover(error, self._ends(readings)[0])
         _, _, free, known = self._fluctuating(left)
         return free**2, known
 
@@ -192,19 +191,23 @@ class Statistics:
             Statistic("upper cut-off of the readings", count=False, off=False),
         ]
 
-    def _ends(self, readings: FloatArray) -> tuple[float, float]:
-        """Return where readings (k, b) are cut off [m], those included that are too far out to be trusted."""
-        low, high = cut_off_ends(readings[self._read], self._base[self._read])
+    def _ends(self, readings: FloatArray) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return the ends of what is read [m], readings (k, b) included that are too far out to be trusted.
+
+        And where they are cut off, which is the middle of a pile.
+        """
+        (low, high), (least, greatest) = cut_offs(readings[self._read], self._base[self._read])
         said = readings[self._read & np.isfinite(readings)]
         farthest = float(said.max()) if len(said) else np.inf
         beyond = np.isinf(readings[self._read & (self._base > farthest + GATE)])
         lost = len(beyond) >= PILED and beyond.mean() > _ALL
-        return low, farthest if lost and not np.isfinite(high) else high
+        if lost and not np.isfinite(high):
+            return (low, farthest), (least, farthest)
+        return (low, high), (least, greatest)
 
-    def _piles(self, readings: FloatArray, ends: tuple[float, float]) -> list[float]:
-        """Return where [m] readings are cut off, in units in which a step matters to nobody; ends: without a pile."""
-        places = zip(cut_offs(readings[self._read], self._base[self._read]), ends, strict=True)
-        low, high = (pile if np.isfinite(pile) else end for pile, end in places)
+    def _piles(self, places: tuple[float, float]) -> list[float]:
+        """Return the places [m] at which readings are cut off, in units in which a step of them matters to nobody."""
+        low, high = places
         return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
 
     def _leftover(

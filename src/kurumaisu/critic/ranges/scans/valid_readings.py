@@ -77,14 +77,18 @@ def cut_off_ends(readings: FloatArray, expected: FloatArray | None = None) -> tu
 
     expected [m]: readings as the map has them, which tell a far end that is not sharp. Of that, what lies inside.
     """
-    low, high = (float(pile.min()) if len(pile) else np.inf for pile in _piles(readings, expected))
-    return -low, high
+    return cut_offs(readings, expected)[0]
 
 
-def cut_offs(readings: FloatArray, expected: FloatArray) -> tuple[float, float]:
-    """Return the middles [m] of the piles of the least and the greatest readings; infinite where there is none."""
-    low, high = (float(np.median(pile)) if len(pile) else np.inf for pile in _piles(readings, expected))
-    return -low, high
+def cut_offs(readings: FloatArray, expected: FloatArray | None) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return these ends [m], and the middles of the piles there; infinite where there is none."""
+    near, far = _piles(readings, expected)
+    ends = -near.min(initial=np.inf), far.min(initial=np.inf)
+    return ends, (-_middle(near), _middle(far))
+
+
+def _middle(pile: FloatArray) -> float:
+    return float(np.median(pile)) if len(pile) else np.inf
 
 
 def _piles(readings: FloatArray, expected: FloatArray | None) -> Iterator[FloatArray]:
