@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Scans of a room by rays of numpy and errors of other forms than the package's: for tests of the laser's criticism."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -147,3 +148,20 @@ def recording(folder, effect, size, seed, scans=50, *, rho=0.0, common=0.0, trut
         laser=LaserMount(0.30, 0.0, 0.0, FIRST, INCREMENT, BEAMS),
         truth=(truth, truth) if told else None,
     )
+
+
+def sparse(data, every=3, scans=1):
+    """Return a recording with some of the beams, and of the scans: as good for what is loud, and sooner done."""
+    laser = data.laser
+    between = BEAM_TIME if laser.time_increment is None else laser.time_increment
+    names = data.runs[0].scan.columns[::every]
+    runs = tuple(
+        replace(run, scan=Series(run.scan.t[::scans], run.scan.values[::scans, ::every], names)) for run in data.runs
+    )
+    fan = replace(
+        laser,
+        angle_increment=every * laser.angle_increment,
+        beams=len(names),
+        time_increment=every * between,
+    )
+    return replace(data, runs=runs, laser=fan)

@@ -17,7 +17,7 @@ from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.params import shipped
 
 
-def _made(seed: int, *faults: Fault, seconds: float = 60.0) -> Recording:
+def _made(seed: int, *faults: Fault, seconds: float = 30.0) -> Recording:
     drives = draw_drives("rich", USUAL, np.random.default_rng(seed), seconds=seconds, rate=20.0)
     return recording("made", drives, list(faults))
 
@@ -51,7 +51,7 @@ def test_clocks_that_differ_by_more_are_wrong_data() -> None:
 @pytest.mark.parametrize("cause", ["base.lag_w", "base.accel_limit", "base.gain_v", "base.payload"])
 def test_what_a_chair_does_is_no_clock(cause: str) -> None:
     rng = np.random.default_rng(8)
-    told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other"), seconds=30.0))
+    told = _verdict(_made(7, BASE[cause].fault(BASE[cause].draw(rng), "other")))
     assert not any("before its command" in problem for problem in told.problems)
     assert cause in [named.id for named in told.causes] + [each for one in told.confounded for each in one]
 

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Beside an effect that does far more than small changes tell, nothing else is seen that is not there."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from laser_scene import sparse
 
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
 from kurumaisu.critic.ranges.search import dominant_effect
 from kurumaisu.critic.values.laser_finding import LaserFinding
-from kurumaisu.critic.values.verdict import Cause
+from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -21,7 +23,7 @@ MODEL = load_model(shipped("launch/md100.yaml"))
 def test_scans_that_are_taken_nearly_at_once_have_no_other_fault(own, tmp_path):
     """A slow clock, a wrong mounting and a wrong map drew the rest of a line; a model may know a part of it already."""
     case = make(Ask("single", ("laser.sweep",), 300.0, "other", family="laser"), 29301, tmp_path)
-    found = scan_verdict.criticise_scans(case.recording, extend(MODEL, own), lambda _: None)
+    found = scan_verdict.criticise_scans(sparse(case.recording), extend(MODEL, own), lambda _: None)
     assert [cause.id for cause in found.causes] == ["laser.sweep"]
     assert not found.confounded
     assert not found.unknown
@@ -44,3 +46,20 @@ def test_what_is_still_missing_of_it_makes_no_set(monkeypatch):
     assert found.confounded == (apart,)
     assert [cause.id for cause in found.causes] == [lead.id]
     assert found.settings == (lead,)
+
+
+@pytest.mark.parametrize(
+    ("low", "causes"), [(-0.001, ["laser.clock_skew"]), (0.001, ["laser.latency", "laser.clock_skew"])]
+)
+def test_a_lead_of_which_nothing_is_left_beside_the_others_is_taken_back(monkeypatch, low, causes):
+    """A clock that runs fast was a delay at first."""
+    monkeypatch.setattr(dominant_effect, "misfits", lambda *_: ())
+    assembly = SimpleNamespace(marks=SimpleNamespace(together=lambda _: np.zeros((1, 1))))
+    lead = EffectSetting("laser.latency", {"delay": 0.03})
+    skew = EffectSetting("laser.clock_skew", {"skew": 0.005})
+    again = Cause("laser.latency", 1.0, {"delay": Estimate(0.002, low, 0.005, "s")}, 10.0)
+    other = Cause("laser.clock_skew", 1.0, {"skew": Estimate(0.005, 0.0049, 0.0051, "1")}, 900.0)
+    rest = LaserFinding(causes=(again, other), settings=(replace(lead, parameters={"delay": 0.002}), skew))
+    found = dominant_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
+    assert [cause.id for cause in found.causes] == causes
+    assert [setting.id for setting in found.settings] == causes

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.merge import headline
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
@@ -35,7 +35,7 @@ def turning_left(times, poses):
     ],
 )
 def test_a_heading_that_errs_with_something_is_told_over_it(tmp_path, covariate, by):
-    found = criticise_scans(turned(recording(tmp_path, None, 0.0, 12, scans=100), by), MODEL, lambda _: None)
+    found = criticise_scans(turned(sparse(recording(tmp_path, None, 0.0, 12, scans=100)), by), MODEL, lambda _: None)
     told = [(one.channel, one.covariate) for one in found.unknown[:1]]
     assert told == ([] if covariate is None else [("reference.heading", covariate)])
     assert found.causes == ()

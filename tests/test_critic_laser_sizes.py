@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.scan_estimates import another_map
@@ -119,7 +119,7 @@ def test_a_size_is_no_surer_than_the_form_that_it_belongs_to(tmp_path):
 @pytest.mark.parametrize(("name", "size"), [("laser.scale", 0.05), ("laser.cyclic", 0.03), ("laser.quadratic", 0.02)])
 def test_a_cause_far_out_of_the_noise_leaves_no_scatter(tmp_path, name, size):
     """It has moved poses and made outliers of readings until it was known."""
-    seen = criticise_scans(recording(tmp_path, name, size, 2), MODEL, lambda _: None)
+    seen = criticise_scans(sparse(recording(tmp_path, name, size, 2)), MODEL, lambda _: None)
     assert [cause.id for cause in seen.causes] == [name]
     (told,) = (cause.parameters for cause in seen.causes)
     first = next(iter(told.values()))

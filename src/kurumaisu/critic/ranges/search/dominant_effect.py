@@ -65,10 +65,13 @@ def with_dominant(
 ) -> LaserFinding:
     """Return what was found with an effect in place, and the effect; cause: as it was found at first.
 
-    What is still missing of it is no question of whether it acts.
+    What is still missing of it is no question of whether it acts, unless nothing is left of it beside the others.
     """
     again = next((each for each in rest.causes if each.id == lead.id), None)
     if again is not None:
+        if _nothing(again):
+            settings = tuple(setting for setting in rest.settings if setting.id != lead.id)
+            return replace(rest, causes=tuple(each for each in rest.causes if each is not again), settings=settings)
         cause = replace(cause, parameters=again.parameters)
     alone = copy(assembly)
     alone.columns = assembly.marks.together([lead])[:, :, np.newaxis].astype(np.float32)
@@ -82,3 +85,10 @@ def with_dominant(
         settings=rest.settings if moved else (lead, *rest.settings),
         pictures=replace(rest.pictures, misfits=(*shown, *others)),
     )
+
+
+def _nothing(cause: Cause) -> bool:
+    """Tell whether nothing may be left of an effect, by all of its intervals."""
+    nulls = {p.name: p.null for p in effects.by_id(cause.id).parameters}
+    sizes = {name: one for name, one in cause.parameters.items() if one.hi90 > one.lo90}
+    return bool(sizes) and all(one.lo90 <= nulls[name] <= one.hi90 for name, one in sizes.items())
