@@ -23,7 +23,7 @@ MODEL = load_model(shipped("launch/md100.yaml"))
 def test_scans_that_are_taken_nearly_at_once_have_no_other_fault(own, tmp_path):
     """A slow clock, a wrong mounting and a wrong map drew the rest of a line; a model may know a part of it already."""
     case = make(Ask("single", ("laser.sweep",), 300.0, "other", family="laser"), 29301, tmp_path)
-    found = scan_verdict.criticise_scans(sparse(case.recording), extend(MODEL, own), lambda _: None)
+    found = scan_verdict.criticise_scans(sparse(case.recording, scans=6), extend(MODEL, own), lambda _: None)
     assert [cause.id for cause in found.causes] == ["laser.sweep"]
     assert not found.confounded
     assert not found.unknown
