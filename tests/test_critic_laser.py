@@ -17,6 +17,7 @@ from kurumaisu.critic.ranges.scans.beams import gather
 from kurumaisu.critic.ranges.scans.repeatability import repeatability
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch, confusion
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
 from kurumaisu.world import load_world
@@ -28,6 +29,14 @@ REAL = Path(__file__).resolve().parents[2] / "shared/data/player_urg04lx/hokuyo_
 
 def say(_):
     """Progress that nobody reads."""
+
+
+@pytest.mark.filterwarnings("error")
+def test_where_beams_meet_nothing_no_effect_on_readings_does_anything(tmp_path):
+    shots = gather(recording(tmp_path, None, 0.0, 1, scans=6), MODEL)
+    away = EffectColumns(replace(shots, walls=replace(shots.walls, segments=shots.walls.segments + 1e6)))
+    assert not np.isfinite(away.base).any()
+    assert away.forms(None)[0] == []
 
 
 def test_what_is_missing_is_said(tmp_path):

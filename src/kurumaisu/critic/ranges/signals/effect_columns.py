@@ -199,7 +199,7 @@ class EffectColumns:
             if effect.random and not np.array_equal(up, self._moved(effect, parameter, 1.0, 1), equal_nan=True):
                 continue  # what it adds is drawn: no mean
             down = self._moved(effect, parameter, -1.0, 0) if parameter.lower < parameter.null else -up
-            if np.nanmax(np.abs(up)) < _NOTHING:
+            if _largest(up) < _NOTHING:
                 shaping.append(parameter)
             elif _rms(up + down) > _rms(up - down):
                 squares.append(parameter)
@@ -230,7 +230,7 @@ class EffectColumns:
         known = self._probe._halves
         if (effect.id, parameter.name) not in known:
             whole, half = (self._probe._moved(effect, parameter, steps, 0) for steps in (1.0, 0.5))
-            known[effect.id, parameter.name] = bool(np.nanmax(np.abs(whole - 2 * half)) < _NOTHING)
+            known[effect.id, parameter.name] = _largest(whole - 2 * half) < _NOTHING
         return known[effect.id, parameter.name]
 
     def _squares(
@@ -279,5 +279,10 @@ def _unit(column: FloatArray) -> FloatArray:
     return np.asarray(flat / max(float(np.linalg.norm(flat)), 1e-300))
 
 
+def _largest(values: FloatArray) -> float:
+    """Return the largest size of what is known; 0 where beams meet nothing."""
+    return float(np.max(np.abs(values), initial=0.0, where=~np.isnan(values)))
+
+
 def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.nanmean(values**2)))
+    return float(np.sqrt(np.nansum(values**2) / max(np.count_nonzero(~np.isnan(values)), 1)))
