@@ -27,6 +27,7 @@ from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, w
 from kurumaisu.critic.judge.merge import refuted, with_scans
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
     Cause,
@@ -163,6 +164,21 @@ def test_a_fit_to_other_scans_finds_the_size(tmp_path):
     shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
     (again,) = scan_gain.refit(shots, (EffectSetting("laser.scale", {"scale": 0.02}),))
     assert again.parameters["scale"] == pytest.approx(0.01, abs=0.002)
+
+
+def test_a_fit_to_few_other_scans_never_explains_them_worse(tmp_path):
+    """In a room that only gets warmer nobody tells an offset from a coefficient and a lag; the line leads far."""
+    data = scanned(tmp_path, "laser.offset", 0.003, 3, scans=20)
+    (run,) = data.runs
+    warmth = Series(run.scan.t, 18 + 0.1 * run.scan.t[:, np.newaxis], ("temperature",))
+    data = replace(data, runs=(replace(run, covariates={"temperature": warmth}),))
+    shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
+    values = {"coefficient": -5e-4, "swing": 5.0, "reference": 21.9, "period": 600.0, "lag": 41.0}
+    before = EffectSetting("laser.temperature", values)
+    (again,) = scan_gain.refit(shots, (before,))
+    known, rows = scan_gain.Expectations(shots), np.arange(len(shots.stamps))
+    off = [np.nanmedian(np.abs(shots.measured - known.rows((one,), rows).mean)) for one in (before, again)]
+    assert off[1] < off[0]
 
 
 def bare():

@@ -17,7 +17,7 @@ from kurumaisu.critic.ranges.signals.shape_grids import grid_of
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import Cause, Estimate
-from kurumaisu.effects import Parameter
+from kurumaisu.effects import Parameter, by_id
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -50,6 +50,9 @@ def test_a_time_that_a_short_drive_does_not_see_is_tried():
     assert min(times) < 10
     assert max(grid_of(TAU, 3600.0)) == times[0]  # in no hour more is known of what lasts for hours
     assert min(grid_of(TAU, 36000.0)) < 100
+    lag = next(p for p in by_id("laser.temperature").parameters if p.name == "lag")
+    assert grid_of(lag, 600.0)[0] == 0.0
+    assert all(np.diff(grid_of(lag, 600.0)[1:]) < 0)
 
 
 def test_beams_along_a_wall_do_not_speak():

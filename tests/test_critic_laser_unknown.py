@@ -7,7 +7,7 @@ from dataclasses import replace
 import laser_scene
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import recording, sparse
 
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
@@ -20,7 +20,7 @@ from kurumaisu.critic.ranges.scans.standstill import stands_averaged
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series
-from kurumaisu.effects import Echoes
+from kurumaisu.effects import LAGS, Echoes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -95,6 +95,30 @@ def test_the_temperature_that_was_recorded_is_followed():
     echoes = Echoes(150.0, 0 * one, one, 0 * one, one, one, 0 * one, 0 * one, one)
     assert chain.read(replace(echoes, known={"temperature": 25.0}))[0] - 1 == pytest.approx(0.002)
     assert chain.read(echoes)[0] - 1 == pytest.approx(0.0025)
+    slow = effects.build_laser((EffectSetting("laser.temperature", {**values, "lag": 60.0}),), np.random.default_rng(0))
+    known = {"temperature": 25.0}
+    assert slow.read(replace(echoes, known=known))[0] - 1 == pytest.approx(0.002), "nobody knows how it was before"
+    past = {"temperature": 20.0 + LAGS[np.newaxis] / 60.0}
+    assert slow.read(replace(echoes, known=known, past=past))[0] - 1 == pytest.approx(0.0)
+
+
+def test_a_laser_that_follows_the_temperature_late_is_told_with_its_lag(tmp_path):
+    """Half a minute behind the thermometer, in rooms that get warmer and colder."""
+    data = sparse(recording(tmp_path, None, 0.0, 7, scans=240), scans=3)
+    (run,) = data.runs
+    times = np.arange(0.0, run.scan.t[-1] + 1.0)
+    room, own = 21 + 4 * np.sin(times / 12.0), [21.0]
+    for warmth in room[1:].tolist():
+        own.append(own[-1] + (warmth - own[-1]) / 30.0)
+    drift = 0.003 * (np.interp(run.scan.t, times, own) - 21.0)
+    scan = replace(run.scan, values=run.scan.values + drift[:, np.newaxis])
+    known = {"temperature": Series(times, room[:, np.newaxis], ("temperature",))}
+    found = criticise_scans(replace(data, runs=(replace(run, scan=scan, covariates=known),)), MODEL, say)
+    assert [cause.id for cause in found.causes] == ["laser.temperature"]
+    assert found.unknown == ()
+    told = found.causes[0].parameters
+    assert told["lag"].lo90 < 30.0 < told["lag"].hi90
+    assert told["coefficient"].estimate == pytest.approx(0.003, rel=0.2)
 
 
 def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):

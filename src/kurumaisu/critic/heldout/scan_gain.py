@@ -25,7 +25,10 @@ RANGE_CHANNEL = "range"
 _SCANS = 60  # of test runs
 _BLOCK = 5  # scans resampled as a whole: neighbours share the errors of their poses
 _STEP = 0.05  # of a parameter, as a share of its distance from the null, to see what it does
+_PARTS_OF_STEP = (1.0, 0.5, 0.25, 0.125)
 _VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
+
+_Key = tuple[str, str]  # an effect and a parameter of it
 
 
 @dataclass(frozen=True)
@@ -115,50 +118,44 @@ def refit(shots: Shots, settings: Settings) -> Settings:
 
 
 def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
-    """Return the same for some of the scans."""
+    """Return the same for some of the scans: a step along the line on which readings follow the sizes, or a part of it.
+
+    Sizes that few scans tell from each other go far on it, where readings do not follow it.
+    """
     base, measured = known.rows(settings, rows), known.shots.measured[rows]
-    changes = []
-    for setting in settings:
-        for p in effects.by_id(setting.id).parameters:
-            size = abs(setting.parameters[p.name] - p.null)
-            if size == 0 or p.lower == p.upper:
-                continue
-            moved = _with(settings, {(setting.id, p.name): _inside(p, setting.parameters[p.name] + _STEP * size)})
-            change = known.rows(moved, rows).mean - base.mean
-            if np.any(change[base.place]):
-                changes.append(((setting.id, p.name), size, change))
-    if not changes:
-        return settings
-    error = measured - base.mean
     sd = scattered(base, measured, settings).of(base)[1]
-    use = base.place & (np.abs(np.nan_to_num(error / sd, nan=np.inf)) < OUTLIER)
-    keys, columns, sizes = [], [], []
-    for key, size, change in changes:
-        column = change[use] / sd[use]
-        if np.isfinite(column).all() and np.any(column):
-            keys.append(key)
-            columns.append(column / _STEP)
-            sizes.append(size)
-    if not keys:
-        return settings
-    j = np.column_stack(columns)
-    shares = np.linalg.solve(j.T @ j + np.eye(len(keys)) / _VAGUE**2, j.T @ (error / sd)[use])
+    use = base.place & (np.abs(np.nan_to_num((measured - base.mean) / sd, nan=np.inf)) < OUTLIER)
     at = {(setting.id, name): value for setting in settings for name, value in setting.parameters.items()}
     bounds = {(s.id, p.name): p for s in settings for p in effects.by_id(s.id).parameters}
-    return _with(
-        settings,
-        {
-            key: _inside(bounds[key], at[key] + share * size)
-            for key, share, size in zip(keys, shares.tolist(), sizes, strict=True)
-        },
-    )
+    columns: dict[_Key, FloatArray] = {}
+    for key, p in bounds.items():
+        if (size := abs(at[key] - p.null)) and p.lower != p.upper:
+            moved = _with(settings, {key: _inside(p, at[key] + _STEP * size)})
+            column = ((known.rows(moved, rows).mean - base.mean) / sd)[use] / (_STEP * size)
+            if np.isfinite(column).all() and np.any(column):
+                columns[key] = column
+    if not columns:
+        return settings
+    sizes = np.array([abs(at[key] - bounds[key].null) for key in columns])
+    j = np.column_stack(list(columns.values())) * sizes
+    shares = np.linalg.solve(j.T @ j + np.eye(len(sizes)) / _VAGUE**2, j.T @ ((measured - base.mean) / sd)[use])
+
+    def stepped(part: float) -> Settings:
+        ends = zip(columns, (part * shares * sizes).tolist(), strict=True)
+        return _with(settings, {key: _inside(bounds[key], at[key] + step) for key, step in ends})
+
+    def misfit(some: Settings) -> float:
+        z = (measured - known.rows(some, rows).mean)[use] / sd[use]
+        return float(np.sum(np.minimum(np.nan_to_num(z, nan=OUTLIER) ** 2, OUTLIER**2)))
+
+    return min((settings, *map(stepped, _PARTS_OF_STEP)), key=misfit)
 
 
 def _inside(parameter: effects.Parameter, value: float) -> float:
     return float(np.clip(value, parameter.lower, parameter.upper))
 
 
-def _with(settings: Settings, values: dict[tuple[str, str], float]) -> Settings:
+def _with(settings: Settings, values: dict[_Key, float]) -> Settings:
     return tuple(
         EffectSetting(s.id, {name: values.get((s.id, name), value) for name, value in s.parameters.items()})
         for s in settings

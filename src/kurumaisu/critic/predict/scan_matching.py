@@ -109,6 +109,7 @@ def _seen(shots: Shots, owner: IntArray, stamps: FloatArray, measured: FloatArra
         measured=measured,
         shift=np.zeros((*measured.shape, 3)),
         known={name: values[owner] for name, values in shots.known.items()},
+        past={name: values[owner] for name, values in shots.past.items()},
     )
 
 

@@ -17,6 +17,9 @@ import numpy as np
 from kurumaisu.effects.mechanism import Mechanism
 from kurumaisu.types import FloatArray
 
+#: [s] Time constants of what is known of the past.
+LAGS = np.r_[0.0, np.geomspace(2.0, 2048.0, 21)]
+
 
 class LaserStage(IntEnum):
     """When an effect acts on a scan; effects apply in this order, those of a stage in the catalogue's."""
@@ -60,7 +63,8 @@ class Echoes:
     measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
     stage NOISE, until then they mean nothing.
     origins (n, 3): the laser's pose in the map when each beam is fired, None where nobody knows it.
-    known: what else was recorded at the stamp, by name, such as temperature [deg C].
+    known: what else was recorded at the stamp, by name, such as temperature [deg C]; past: the same, behind by
+    first-order lags of LAGS, (k, l), where more than the present is known.
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
@@ -75,6 +79,7 @@ class Echoes:
     readings: FloatArray
     origins: FloatArray | None = None
     known: Mapping[str, float | FloatArray] = field(default_factory=dict)
+    past: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 class LaserEffect(Mechanism):

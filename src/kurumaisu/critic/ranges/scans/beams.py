@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
+from scipy.signal import lfilter
 
 from kurumaisu import effects, geometry
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.walls import Rays, Walls, walls_at
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
-from kurumaisu.effects import Beams, Echoes, LaserChain, incidence, slanted
+from kurumaisu.effects import LAGS, Beams, Echoes, LaserChain, incidence, slanted
 from kurumaisu.params import EffectSetting, Laser, Model, Mount
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world import load_world
@@ -27,6 +28,7 @@ _LEAST = 1e-4  # [m] deviation of a reading
 _MOVE = 1e-3  # [m, rad] of a pose, to see how readings depend on it
 _GAP, _LONG = 0.3, 3.0  # [s], and usual times between poses, from which some are missing
 _STAYS = 0.02  # [m, rad] from pose to pose within which the chair may have stood meanwhile
+_PAST = 0.5  # [s] steps in which what was recorded is followed into the past
 _ABOUT = 0.15  # [s] before and after a scan, between which its rates are taken
 
 
@@ -46,7 +48,8 @@ class Shots:
     stamps (k,) [s] since the laser's time 0, which is `zero` [s] by the clock of the runs; run (k,): index into tracks
     and runs, their names; measured (k, b) [m], nan no valid reading,
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
-    known: what else was recorded, by name, at each scan (k,), and the chair's rates.
+    known: what else was recorded, by name, at each scan (k,), and the chair's rates; past (k, l): of what was recorded,
+    behind by each of LAGS.
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
     linearised there; a rate taken from noisy poses would be a noisy covariate.
     """
@@ -61,6 +64,7 @@ class Shots:
     said: FloatArray
     shift: FloatArray
     known: Mapping[str, FloatArray]
+    past: Mapping[str, FloatArray]
     zero: float
     runs: tuple[str, ...]
 
@@ -116,6 +120,7 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
     known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names - set(RATES))}
+    past: dict[str, list[FloatArray]] = {name: [] for name in known}
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
@@ -126,6 +131,8 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
         measured.append(run.scan.values[rows])
         for name, values in columns_at(run, known, run.scan.t[rows]).items():
             known[name].append(values)
+        for name, behind in past_at(run, known, run.scan.t[rows]).items():
+            past[name].append(behind)
     readings, owner = np.concatenate(measured), np.array([i for i, _ in chosen])
     rates = rates_at(tracks, owner, np.concatenate(stamps))
     return Shots(
@@ -139,6 +146,7 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
         known={**{name: np.concatenate(parts) for name, parts in known.items()}, **rates},
+        past={name: np.concatenate(parts) for name, parts in past.items()},
         zero=zero,
         runs=tuple(run.name for run in runs),
     )
@@ -148,6 +156,24 @@ def columns_at(run: Run, names: Iterable[str], stamps: FloatArray) -> dict[str, 
     """Return the columns of these names that a run has, at stamps (k,) [s]."""
     there = {name: run.covariates[name] for name in names if name in run.covariates}
     return {name: np.interp(stamps, series.t, series.values[:, 0]) for name, series in there.items()}
+
+
+def past_at(run: Run, names: Iterable[str], stamps: FloatArray) -> dict[str, FloatArray]:
+    """Return the same columns at stamps (k,) [s], behind by first-order lags of LAGS [s], (k, l).
+
+    As a run begins, each has long been what it is.
+    """
+    out = {}
+    for name in names:
+        if name not in run.covariates:
+            continue
+        series = run.covariates[name]
+        grid = np.arange(series.t[0], series.t[-1] + _PAST, _PAST)
+        given = np.interp(grid, series.t, series.values[:, 0])
+        keep = np.exp(-_PAST / np.maximum(LAGS, 1e-9))
+        behind = [lfilter([1 - k], [1, -k], given, zi=[k * given[0]])[0] for k in keep.tolist()]
+        out[name] = np.stack([np.interp(stamps, grid, each) for each in behind], axis=-1)
+    return out
 
 
 def rates_at(tracks: Sequence[Track], run: IntArray, stamps: FloatArray) -> dict[str, FloatArray]:
@@ -284,7 +310,7 @@ def read(
     """
     mean, sd = shots.laser.error.mean(seen.ranges) + moved, shots.laser.error.deviation(seen.ranges)
     known = {name: values[:, np.newaxis] for name, values in shots.known.items()}
-    parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known)
+    parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known, shots.past)
     return chain.read(Echoes(shots.stamps[:, np.newaxis], shots.laser.bearings, *parts))
 
 
@@ -341,6 +367,7 @@ def some_scans(shots: Shots, rows: IntArray) -> Shots:
         measured=shots.measured[rows],
         shift=shots.shift[rows],
         known={name: values[rows] for name, values in shots.known.items()},
+        past={name: values[rows] for name, values in shots.past.items()},
     )
 
 

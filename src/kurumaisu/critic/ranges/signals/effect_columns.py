@@ -186,9 +186,9 @@ class EffectColumns:
                 for beside in pairs:
                     marks.append(Column(parameter, squared=False, beside=beside))
                     values.append(self._slope(effect, parameter, {**at, **beside}))
-            unit = _unit(values[0])
-            if all(abs(float(unit @ other)) < _SAME for other in known):
-                known.append(unit)
+            span = _span(values)
+            if not any(_alike(span, other) for other in known):
+                known.append(span)
                 yield {**at, **pairs[0]}, marks, values
 
     def sort(self, effect: type[Mechanism]) -> tuple[list[Parameter], list[Parameter], list[Parameter]]:
@@ -277,6 +277,19 @@ class EffectColumns:
 def _unit(column: FloatArray) -> FloatArray:
     flat = np.nan_to_num(column).ravel()
     return np.asarray(flat / max(float(np.linalg.norm(flat)), 1e-300))
+
+
+def _span(columns: Sequence[FloatArray]) -> FloatArray:
+    """Return an orthonormal basis (n, m) of what columns span."""
+    basis, sizes, _ = np.linalg.svd(np.stack([_unit(column) for column in columns], axis=1), full_matrices=False)
+    return np.asarray(basis[:, sizes > _RANK * sizes[0]])
+
+
+def _alike(one: FloatArray, other: FloatArray) -> bool:
+    """Tell whether two bases span nearly the same."""
+    if one.shape != other.shape:
+        return False
+    return bool(np.linalg.svd(one.T @ other, compute_uv=False).min(initial=1.0) > _SAME)
 
 
 def _largest(values: FloatArray) -> float:

@@ -30,10 +30,14 @@ def grid_of(parameter: Parameter, span: float) -> list[float]:
     """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds.
 
     The longest time comes first: of shapes that are alike the first is kept, and that one is most like a constant.
+    Before it is none, where that is usual.
     """
     if parameter.unit == "s":
-        longest, shortest = _LONG * parameter.null, _SHORT * min(span, parameter.null)
+        usual = parameter.null or parameter.scale
+        longest, shortest = _LONG * usual, _SHORT * min(span, usual)
         values = longest * 2.0 ** -np.arange(0, np.log2(longest / shortest) + 0.1, 0.5)
+        if not parameter.null:
+            values = np.r_[0.0, values]
     elif parameter.lower > 0:
         values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
     else:
