@@ -13,21 +13,23 @@ from kurumaisu.params import EffectSetting
 STEPS, SHIFT = "laser.quantisation", "laser.offset"
 
 
-def told(step, offset, half=1e-4):
+def told(step, offset, half=1e-4, own=0.0):
     causes = (
         Cause(STEPS, 1.0, {"step": Estimate(step, step - half, step + half, "m")}, 50.0),
         Cause(SHIFT, 0.99, {"offset": Estimate(offset, offset - half, offset + half, "m")}, 900.0),
     )
     settings = {
-        STEPS: EffectSetting(STEPS, {"step": step, "cut": 0.0}),
+        STEPS: EffectSetting(STEPS, {"step": step, "cut": own}),
         SHIFT: EffectSetting(SHIFT, {"offset": offset}),
     }
     return with_shifting_forms(causes, settings)
 
 
+@pytest.mark.parametrize("own", [0.0, 1.0])
 @pytest.mark.parametrize(("offset", "cut"), [(-0.00345, 1.0), (0.0034, -1.0)])
-def test_half_a_step_is_told_with_the_steps(offset, cut):
-    (cause,), (setting,) = told(0.0069, offset)
+def test_half_a_step_is_told_with_the_steps(offset, cut, own):
+    """Whichever form the scatter had taken: it sees the steps, not by how much readings are off."""
+    (cause,), (setting,) = told(0.0069, offset, own=own)
     assert (cause.id, cause.gain_nats) == (STEPS, 950.0)
     assert setting.parameters == {"step": 0.0069, "cut": cut}
 

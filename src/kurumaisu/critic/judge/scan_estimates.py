@@ -91,8 +91,9 @@ def with_shifting_forms(
     Where a remainder is cut off, say, readings are too short by half a step.
     """
     for cause in causes:
-        for form in effects.by_id(cause.id).forms[1:] if cause.id in settings else ():
-            usual, other = (_constant({**settings[cause.id].parameters, **each}, cause.id) for each in ({}, form))
+        forms = effects.by_id(cause.id).forms
+        for form in forms[1:] if cause.id in settings else ():
+            usual, other = (_constant({**settings[cause.id].parameters, **each}, cause.id) for each in (forms[0], form))
             if usual is None or other is None:
                 continue
             for shift in causes:
