@@ -12,7 +12,7 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
 from kurumaisu.critic.ranges.search import dominant_effect
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -59,7 +59,10 @@ def test_a_lead_of_which_nothing_is_left_beside_the_others_is_taken_back(monkeyp
     skew = EffectSetting("laser.clock_skew", {"skew": 0.005})
     again = Cause("laser.latency", 1.0, {"delay": Estimate(0.002, low, 0.005, "s")}, 10.0)
     other = Cause("laser.clock_skew", 1.0, {"skew": Estimate(0.005, 0.0049, 0.0051, "1")}, 900.0)
-    rest = LaserFinding(causes=(again, other), settings=(replace(lead, parameters={"delay": 0.002}), skew))
+    drawn = tuple(SimpleNamespace(explained_by=name) for name in ("laser.latency", "laser.clock_skew"))
+    settings = (replace(lead, parameters={"delay": 0.002}), skew)
+    rest = LaserFinding(causes=(again, other), settings=settings, pictures=Pictures(misfits=drawn))
     found = dominant_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
     assert [cause.id for cause in found.causes] == causes
     assert [setting.id for setting in found.settings] == causes
+    assert [misfit.explained_by for misfit in found.pictures.misfits] == ["laser.clock_skew"]

@@ -38,9 +38,20 @@ from kurumaisu.effects.dac_quantisation import DacQuantisation
 from kurumaisu.effects.dac_zero import DacZeroF, DacZeroS
 from kurumaisu.effects.dead_zone import DeadZoneV, DeadZoneW
 from kurumaisu.effects.delay import Delay
+from kurumaisu.effects.first_order import FirstOrder
 from kurumaisu.effects.gain import GainV, GainW
 from kurumaisu.effects.lag import LagV, LagW
-from kurumaisu.effects.laser import LAGS, LASER, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
+from kurumaisu.effects.laser import (
+    LAGGED,
+    LAGS,
+    LASER,
+    BeamEffect,
+    Beams,
+    Echoes,
+    LaserEffect,
+    LaserStage,
+    ReadingEffect,
+)
 from kurumaisu.effects.laser.chain import LaserChain, incidence, slanted
 from kurumaisu.effects.laser.smooth import RANGE_COVARIATES, smooth_range_id, smooth_reading_of, smooth_scatter_id
 from kurumaisu.effects.lateral_slip import LateralSlip
@@ -235,6 +246,7 @@ __all__ = [
     "CHANNELS",
     "CONSTANTS",
     "COVARIATES",
+    "LAGGED",
     "LAGS",
     "LASER",
     "LATE",
@@ -253,6 +265,7 @@ __all__ = [
     "Context",
     "Echoes",
     "Effect",
+    "FirstOrder",
     "Follower",
     "Follows",
     "LaserChain",

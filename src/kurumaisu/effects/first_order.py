@@ -9,9 +9,9 @@ from kurumaisu.types import FloatArray
 class FirstOrder:
     """First-order lag, exact for an input held over the grid's step; a sample is the step's mean rate."""
 
-    def __init__(self) -> None:
-        """Start at rest."""
-        self.level = 0.0  # of the rate at the end of the last step
+    def __init__(self, level: float = 0.0) -> None:
+        """Start at a level that has long been asked for: at rest, if none is given."""
+        self.level = level  # of the rate at the end of the last step
 
     def follow(self, target: FloatArray, dt: float, tau: float) -> FloatArray:
         """Return the mean rates (n,) over steps of dt [s] for targets (n,); tau [s]."""

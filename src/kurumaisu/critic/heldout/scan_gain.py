@@ -25,7 +25,7 @@ RANGE_CHANNEL = "range"
 _SCANS = 60  # of test runs
 _BLOCK = 5  # scans resampled as a whole: neighbours share the errors of their poses
 _STEP = 0.05  # of a parameter, as a share of its distance from the null, to see what it does
-_PARTS_OF_STEP = (1.0, 0.5, 0.25, 0.125)
+_PARTS_OF_STEP = (1.0, 0.5, 0.25, 0.125)  # that are tried
 _VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
 
 _Key = tuple[str, str]  # an effect and a parameter of it
@@ -124,29 +124,29 @@ def _refit(known: Expectations, rows: IntArray, settings: Settings) -> Settings:
     """
     base, measured = known.rows(settings, rows), known.shots.measured[rows]
     sd = scattered(base, measured, settings).of(base)[1]
-    use = base.place & (np.abs(np.nan_to_num((measured - base.mean) / sd, nan=np.inf)) < OUTLIER)
+    z = (measured - base.mean) / sd
+    use = base.place & (np.abs(np.nan_to_num(z, nan=np.inf)) < OUTLIER)
     at = {(setting.id, name): value for setting in settings for name, value in setting.parameters.items()}
     bounds = {(s.id, p.name): p for s in settings for p in effects.by_id(s.id).parameters}
     columns: dict[_Key, FloatArray] = {}
     for key, p in bounds.items():
         if (size := abs(at[key] - p.null)) and p.lower != p.upper:
             moved = _with(settings, {key: _inside(p, at[key] + _STEP * size)})
-            column = ((known.rows(moved, rows).mean - base.mean) / sd)[use] / (_STEP * size)
+            column = ((known.rows(moved, rows).mean - base.mean) / sd)[use] / _STEP
             if np.isfinite(column).all() and np.any(column):
                 columns[key] = column
     if not columns:
         return settings
-    sizes = np.array([abs(at[key] - bounds[key].null) for key in columns])
-    j = np.column_stack(list(columns.values())) * sizes
-    shares = np.linalg.solve(j.T @ j + np.eye(len(sizes)) / _VAGUE**2, j.T @ ((measured - base.mean) / sd)[use])
+    j = np.column_stack(list(columns.values()))
+    shares = np.linalg.solve(j.T @ j + np.eye(len(columns)) / _VAGUE**2, j.T @ z[use])
+    steps = {key: share * abs(at[key] - bounds[key].null) for key, share in zip(columns, shares.tolist(), strict=True)}
 
     def stepped(part: float) -> Settings:
-        ends = zip(columns, (part * shares * sizes).tolist(), strict=True)
-        return _with(settings, {key: _inside(bounds[key], at[key] + step) for key, step in ends})
+        return _with(settings, {key: _inside(bounds[key], at[key] + part * step) for key, step in steps.items()})
 
     def misfit(some: Settings) -> float:
-        z = (measured - known.rows(some, rows).mean)[use] / sd[use]
-        return float(np.sum(np.minimum(np.nan_to_num(z, nan=OUTLIER) ** 2, OUTLIER**2)))
+        off = (measured - known.rows(some, rows).mean)[use] / sd[use]
+        return float(np.sum(np.minimum(np.nan_to_num(off, nan=OUTLIER) ** 2, OUTLIER**2)))
 
     return min((settings, *map(stepped, _PARTS_OF_STEP)), key=misfit)
 

@@ -199,8 +199,10 @@ def _with_rest(
     cause = Cause(setting.id, evidence[0], estimates_of(setting, sds), evidence[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
     said = tuple(line for line in rest.details if not line.startswith(f"{setting.id}: "))  # of what was left of it
-    rest = replace(rest, details=(*said, *_sentences({setting.id: size}, ())))
-    return without_double_delay(with_dominant(rest, setting, cause, assembly, normal), assembly.shots.stamps)
+    found = with_dominant(replace(rest, details=said), setting, cause, assembly, normal)
+    if any(each.id == setting.id for each in found.causes):
+        found = replace(found, details=(*said, *_sentences({setting.id: size}, ())))
+    return without_double_delay(found, assembly.shots.stamps)
 
 
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:

@@ -102,15 +102,8 @@ def _before(shots: Shots, k: int, stamps: FloatArray) -> IntArray:
 
 
 def _seen(shots: Shots, owner: IntArray, stamps: FloatArray, measured: FloatArray) -> Shots:
-    return replace(
-        shots,
-        stamps=stamps,
-        run=shots.run[owner],
-        measured=measured,
-        shift=np.zeros((*measured.shape, 3)),
-        known={name: values[owner] for name, values in shots.known.items()},
-        past={name: values[owner] for name, values in shots.past.items()},
-    )
+    shift = np.zeros((*measured.shape, 3))
+    return replace(some_scans(shots, owner), stamps=stamps, measured=measured, shift=shift)
 
 
 def _errors(shots: Shots, owner: IntArray, model: ScanModel) -> dict[int, FloatArray]:

@@ -14,7 +14,7 @@ from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
-from kurumaisu.critic.ranges.scans.beams import Shots, Track, columns_at, gather, past_at, rates_at, thin
+from kurumaisu.critic.ranges.scans.beams import Shots, Track, columns_at, gather, past_at, rates_at, thin, together
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -53,7 +53,7 @@ class ScanPoses:
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
             known={**columns_at(run, self._base.known, stamps), **rates_at(tracks, owner, stamps)},
-            past=past_at(run, self._base.past, stamps),
+            past=past_at(run, stamps),
         )
 
     def trained(self) -> list[Shots]:
@@ -119,16 +119,8 @@ def joined(parts: Sequence[Shots]) -> Shots:
         run=np.concatenate([part.run + offset for part, offset in zip(parts, offsets, strict=True)]),
         measured=np.concatenate([part.measured for part in parts]),
         shift=np.concatenate([part.shift for part in parts]),
-        known={
-            name: np.concatenate([part.known[name] for part in parts])
-            for name in parts[0].known
-            if all(name in part.known for part in parts)
-        },
-        past={
-            name: np.concatenate([part.past[name] for part in parts])
-            for name in parts[0].past
-            if all(name in part.past for part in parts)
-        },
+        known=together([part.known for part in parts]),
+        past=together([part.past for part in parts]),
     )
 
 

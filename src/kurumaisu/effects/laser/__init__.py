@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The catalogue of a laser's effects. Those of one stage act in the order of the list."""
 
-from kurumaisu.effects.laser.base import LAGS, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
+from kurumaisu.effects.laser.base import LAGGED, LAGS, BeamEffect, Beams, Echoes, LaserEffect, LaserStage, ReadingEffect
 from kurumaisu.effects.laser.beam_bias import BeamBias
 from kurumaisu.effects.laser.beam_correlation import BeamCorrelation
 from kurumaisu.effects.laser.clock_skew import ClockSkew
@@ -53,4 +53,4 @@ LASER: tuple[type[LaserEffect], ...] = (
     Quantisation,
 )
 
-__all__ = ["LAGS", "LASER", "BeamEffect", "Beams", "Echoes", "LaserEffect", "LaserStage", "ReadingEffect"]
+__all__ = ["LAGGED", "LAGS", "LASER", "BeamEffect", "Beams", "Echoes", "LaserEffect", "LaserStage", "ReadingEffect"]

@@ -17,7 +17,8 @@ import numpy as np
 from kurumaisu.effects.mechanism import Mechanism
 from kurumaisu.types import FloatArray
 
-#: [s] Time constants of what is known of the past.
+LAGGED = frozenset({"temperature"})  #: what is recorded that may act late
+#: [s] Time constants of what is known of its past.
 LAGS = np.r_[0.0, np.geomspace(2.0, 2048.0, 21)]
 
 
@@ -63,8 +64,8 @@ class Echoes:
     measured on; mean, sd [m] of a reading; noise [1]: standard deviates; readings [m]: made of the three after the
     stage NOISE, until then they mean nothing.
     origins (n, 3): the laser's pose in the map when each beam is fired, None where nobody knows it.
-    known: what else was recorded at the stamp, by name, such as temperature [deg C]; past: the same, behind by
-    first-order lags of LAGS, (k, l), where more than the present is known.
+    known: what else was recorded at the stamp, by name, such as temperature [deg C]; past: of
+    LAGGED, behind by first-order lags of LAGS, (k, l), where more than the present is known.
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 

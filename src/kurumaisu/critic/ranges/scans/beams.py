@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kurumaisu import effects, geometry
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.walls import Rays, Walls, walls_at
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
-from kurumaisu.effects import LAGS, Beams, Echoes, LaserChain, incidence, slanted
+from kurumaisu.effects import LAGS, Beams, Echoes, FirstOrder, LaserChain, incidence, slanted
 from kurumaisu.params import EffectSetting, Laser, Model, Mount
 from kurumaisu.types import FloatArray, IntArray
 from kurumaisu.world import load_world
@@ -48,7 +47,7 @@ class Shots:
     stamps (k,) [s] since the laser's time 0, which is `zero` [s] by the clock of the runs; run (k,): index into tracks
     and runs, their names; measured (k, b) [m], nan no valid reading,
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
-    known: what else was recorded, by name, at each scan (k,), and the chair's rates; past (k, l): of what was recorded,
+    known: what else was recorded, by name, at each scan (k,), and the chair's rates; past (k, l): of what acts late,
     behind by each of LAGS.
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
     linearised there; a rate taken from noisy poses would be a noisy covariate.
@@ -119,8 +118,7 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
     zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
-    known: dict[str, list[FloatArray]] = {name: [] for name in sorted(names - set(RATES))}
-    past: dict[str, list[FloatArray]] = {name: [] for name in known}
+    known, past = [], []
     for i, run in enumerate(runs):
         assert run.scan is not None
         assert run.pose is not None
@@ -129,10 +127,8 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
         rows = [index for j, index in chosen if j == i]
         stamps.append(run.scan.t[rows] - zero)
         measured.append(run.scan.values[rows])
-        for name, values in columns_at(run, known, run.scan.t[rows]).items():
-            known[name].append(values)
-        for name, behind in past_at(run, known, run.scan.t[rows]).items():
-            past[name].append(behind)
+        known.append(columns_at(run, sorted(names - set(RATES)), run.scan.t[rows]))
+        past.append(past_at(run, run.scan.t[rows]))
     readings, owner = np.concatenate(measured), np.array([i for i, _ in chosen])
     rates = rates_at(tracks, owner, np.concatenate(stamps))
     return Shots(
@@ -145,8 +141,8 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
         measured=readings,
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
-        known={**{name: np.concatenate(parts) for name, parts in known.items()}, **rates},
-        past={name: np.concatenate(parts) for name, parts in past.items()},
+        known={**together(known), **rates},
+        past=together(past),
         zero=zero,
         runs=tuple(run.name for run in runs),
     )
@@ -158,22 +154,25 @@ def columns_at(run: Run, names: Iterable[str], stamps: FloatArray) -> dict[str, 
     return {name: np.interp(stamps, series.t, series.values[:, 0]) for name, series in there.items()}
 
 
-def past_at(run: Run, names: Iterable[str], stamps: FloatArray) -> dict[str, FloatArray]:
-    """Return the same columns at stamps (k,) [s], behind by first-order lags of LAGS [s], (k, l).
+def past_at(run: Run, stamps: FloatArray) -> dict[str, FloatArray]:
+    """Return the columns of a run that act late, at stamps (k,) [s], behind by first-order lags of LAGS [s], (k, l).
 
     As a run begins, each has long been what it is.
     """
     out = {}
-    for name in names:
-        if name not in run.covariates:
-            continue
+    for name in effects.LAGGED & set(run.covariates):
         series = run.covariates[name]
-        grid = np.arange(series.t[0], series.t[-1] + _PAST, _PAST)
-        given = np.interp(grid, series.t, series.values[:, 0])
-        keep = np.exp(-_PAST / np.maximum(LAGS, 1e-9))
-        behind = [lfilter([1 - k], [1, -k], given, zi=[k * given[0]])[0] for k in keep.tolist()]
-        out[name] = np.stack([np.interp(stamps, grid, each) for each in behind], axis=-1)
+        middles = np.arange(series.t[0], series.t[-1] + _PAST, _PAST)
+        given = np.interp(middles, series.t, series.values[:, 0])
+        behind = [FirstOrder(float(given[0])).follow(given, _PAST, lag) for lag in LAGS.tolist()]
+        out[name] = np.stack([np.interp(stamps, middles, each) for each in behind], axis=-1)
     return out
+
+
+def together(parts: Sequence[Mapping[str, FloatArray]]) -> dict[str, FloatArray]:
+    """Return, one after the other, what all parts have, by name."""
+    names = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
 def rates_at(tracks: Sequence[Track], run: IntArray, stamps: FloatArray) -> dict[str, FloatArray]:

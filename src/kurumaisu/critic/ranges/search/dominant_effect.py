@@ -68,15 +68,19 @@ def with_dominant(
     What is still missing of it is no question of whether it acts, unless nothing is left of it beside the others.
     """
     again = next((each for each in rest.causes if each.id == lead.id), None)
+    others = tuple(one for one in rest.pictures.misfits if one.explained_by != lead.id)
+    if again is not None and _nothing(again):
+        return replace(
+            rest,
+            causes=tuple(each for each in rest.causes if each is not again),
+            settings=tuple(setting for setting in rest.settings if setting.id != lead.id),
+            pictures=replace(rest.pictures, misfits=others),
+        )
     if again is not None:
-        if _nothing(again):
-            settings = tuple(setting for setting in rest.settings if setting.id != lead.id)
-            return replace(rest, causes=tuple(each for each in rest.causes if each is not again), settings=settings)
         cause = replace(cause, parameters=again.parameters)
     alone = copy(assembly)
     alone.columns = assembly.marks.together([lead])[:, :, np.newaxis].astype(np.float32)
     shown = misfits(alone, normal, [Part(lead.id, slice(0, 1), np.ones(1))])
-    others = (one for one in rest.pictures.misfits if one.explained_by != lead.id)
     moved = any(setting.id == lead.id for setting in rest.settings)
     return replace(
         rest,

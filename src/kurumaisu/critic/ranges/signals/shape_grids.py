@@ -30,7 +30,7 @@ def grid_of(parameter: Parameter, span: float) -> list[float]:
     """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds.
 
     The longest time comes first: of shapes that are alike the first is kept, and that one is most like a constant.
-    Before it is none, where that is usual.
+    Where none is usual, none comes before it.
     """
     if parameter.unit == "s":
         usual = parameter.null or parameter.scale
