@@ -13,7 +13,7 @@ from laser_scene import neighbours, recording
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, marginal, whitened
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.repeatability import repeatability
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch, confusion
 from kurumaisu.critic.ranges.search.normal_equations import Assembly

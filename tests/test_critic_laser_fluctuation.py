@@ -11,7 +11,7 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.noise.scan_noise import _Likelihood, with_lasting_common_mode
 from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.ranges.signals.coefficient_blocks import _curves
@@ -31,7 +31,7 @@ def say(_):
 def stands(tmp_path_factory):
     """Scans of stands in a room, 7 of each, without anything hidden."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 84)
+        patch.setattr("kurumaisu.critic.ranges.scans.gathering.MOST_SCANS", 84)
         case = make(Ask("null", regime="clean", design="room", family="laser"), 7, tmp_path_factory.mktemp("room"))
         return Assembly(gather(case.recording, MODEL), frozenset())
 
@@ -177,7 +177,7 @@ def test_a_common_mode_may_last_as_long_as_stands_that_are_shorter_cannot_deny(t
 
 
 def test_what_comes_and_goes_with_the_time_is_no_common_mode(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 72)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.gathering.MOST_SCANS", 72)
     case = make(Ask("unknown", ("pulse_bias",), regime="clean", family="laser"), 29464, tmp_path)
     ids = frozenset({"laser.common_mode", "laser.offset", "laser.warmup", effects.SMOOTH})
     finding = criticise_scans(case.recording, MODEL, say, ids)

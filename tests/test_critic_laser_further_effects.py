@@ -9,7 +9,7 @@ import pytest
 from laser_scene import FIRST, INCREMENT, recording
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import edges
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.ranges.signals.form_error import beam_family

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from laser_scene import recording
 
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.search.large_effect import large_effect
 from kurumaisu.critic.sanity.examination import examine
 from kurumaisu.params import load_model, shipped

@@ -8,7 +8,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.map_changes import map_change
 from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
 from kurumaisu.critic.ranges.search.normal_equations import Assembly

@@ -11,7 +11,8 @@ from laser_scene import recording
 from kurumaisu import effects
 from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, estimate_reading_noise
 from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise
-from kurumaisu.critic.ranges.scans.beams import gather, hits_of
+from kurumaisu.critic.ranges.scans.beams import hits_of
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.range_step import grid_step
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds

@@ -12,7 +12,7 @@ from kurumaisu.critic.judge.merge import with_scans
 from kurumaisu.critic.judge.scan_estimates import another_map
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.judge.scatter_verdict import _spread_of
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, compare_blocks
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormSearch
 from kurumaisu.critic.ranges.search.mean_effects import gain_of

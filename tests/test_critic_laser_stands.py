@@ -11,7 +11,7 @@ from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.poses.creeping_stands import creeping_stands, gather_stands
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.valid_readings import pose_weights
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
@@ -150,7 +150,7 @@ def test_what_a_form_leaves_is_not_one_more_effect():
 
 
 def test_a_delay_is_measured_where_it_acts(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 120)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.gathering.MOST_SCANS", 120)
     case = make(Ask("single", ("laser.latency",), None, family="laser"), 121, tmp_path)
     finding = criticise_scans(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.latency"]

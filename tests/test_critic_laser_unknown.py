@@ -122,7 +122,7 @@ def test_a_laser_that_follows_the_temperature_late_is_told_with_its_lag(tmp_path
 
 
 def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 80)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.gathering.MOST_SCANS", 80)
     case = make(Ask("single", ("laser.tilt",), 40.0, regime="clean", design="room"), 1002, tmp_path)
     finding = criticise_scans(case.recording, MODEL, say)
     assert [cause.id for cause in finding.causes] == ["laser.tilt"]
@@ -133,7 +133,7 @@ def test_a_tilt_is_measured_along_both_axes_but_for_its_sense(tmp_path, monkeypa
 
 
 def test_one_wall_does_not_tell_the_mounting_from_the_map(tmp_path, monkeypatch):
-    monkeypatch.setattr("kurumaisu.critic.ranges.scans.beams.MOST_SCANS", 60)
+    monkeypatch.setattr("kurumaisu.critic.ranges.scans.gathering.MOST_SCANS", 60)
     case = make(Ask("confounded", ("laser.mount_x",), 16.0, regime="clean"), 301, tmp_path)
     finding = criticise_scans(case.recording, MODEL, say)
     assert finding.confounded == (("laser.mount_x", "world.map_error"),)

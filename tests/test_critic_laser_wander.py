@@ -8,7 +8,7 @@ import pytest
 from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.scans.beams import gather
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 

@@ -154,6 +154,9 @@ def test_hinge(tmp_path: Path) -> None:
     hinge = read(tmp_path, "model ( hinge [0.4 0 -90 30] )").models[0].hinge
     assert hinge is not None
     np.testing.assert_allclose([*hinge.anchor, hinge.lowest, hinge.highest], [0.4, 0, -np.pi / 2, np.pi / 6])
+    stiff = read(tmp_path, "model ( hinge [0.4 0 30 30] )").models[0].hinge
+    assert stiff is not None
+    assert stiff.lowest == stiff.highest
 
 
 @pytest.mark.parametrize(

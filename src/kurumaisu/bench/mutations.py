@@ -103,6 +103,7 @@ def main(arguments: Sequence[str]) -> int:
     options = parser.parse_args(arguments)
     tree = options.tree.resolve()
     drawn = draw(tree, options.seed, options.number)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that starts this behind itself has it ignored
     if options.list:
         print("\n".join(str(each) for each in drawn))
         return 0

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import acts_on_readings, laser_of
+from kurumaisu.critic.ranges.scans.beams import acts_on_readings
+from kurumaisu.critic.ranges.scans.gathering import laser_of
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.effects import Beams, Echoes
 from kurumaisu.params import EffectSetting, Laser, Model

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from kurumaisu.critic.heldout import scan_gain, slam_gain
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
-from kurumaisu.critic.ranges.scans.beams import why_not_usable
+from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.settings import Settings

@@ -14,7 +14,8 @@ from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan import OUTLIER, Expected, Joint, ScanModel, scattered
 from kurumaisu.critic.predict.scan_cache import Expectations
 from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
-from kurumaisu.critic.ranges.scans.beams import Shots, why_not_usable
+from kurumaisu.critic.ranges.scans.beams import Shots
+from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import ChannelGain

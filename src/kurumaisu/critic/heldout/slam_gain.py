@@ -16,7 +16,7 @@ from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.heldout.corrected_scans import Corrected, corrected
 from kurumaisu.critic.heldout.drive_gain import BLOCK, rmse_gain
-from kurumaisu.critic.ranges.scans.beams import laser_of
+from kurumaisu.critic.ranges.scans.gathering import laser_of
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import SlamGain
 from kurumaisu.errors import Error

@@ -11,7 +11,8 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.experiment.proposal import DECIDED
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
-from kurumaisu.critic.ranges.scans.beams import gather, hits_of, predict
+from kurumaisu.critic.ranges.scans.beams import hits_of, predict
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.values.recording import Recording, Run, Series

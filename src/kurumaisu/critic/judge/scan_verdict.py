@@ -20,7 +20,7 @@ from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN
 from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
-from kurumaisu.critic.ranges.scans.beams import why_not_usable
+from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
 from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior, FormSearch
@@ -116,7 +116,7 @@ def _too_few(assembly: Assembly, normal: NormalEquations) -> str:
     met = int(np.count_nonzero(np.isfinite(assembly.shots.measured) & np.isfinite(assembly.marks.seen.ranges)))
     return (
         f"only {normal.readings} of {met} readings of walls are away from edges of the map, fewer than the {_FEWEST} "
-        "that tell anything. Walls askew in a map of pixels are stairs, all edges: draw them as polygons"
+        "that tell anything. Walls made of many small blocks are all edges: draw them as long ones"
     )
 
 

@@ -83,6 +83,8 @@ def _of_readings(
     rows = fit.assembly.smooth_rows()
     few = fit.assembly.thinned(rows)
     few.geometry &= usable_beams(few.shots, few.marks.seen, few.marks.base, away)
+    if not few.geometry.any():  # with walls that far off, no beam is surely away from their ends
+        return Scatter([], [], ())
     statistics = Statistics(few, fit.normal.scan_noise)
     means = {f"{form.id}.{column.parameter.name}" for form in assembly.forms for column in form.columns}
     means |= {f"{form.id}.{name}" for form in assembly.forms for name in form.at}

@@ -15,7 +15,7 @@ from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
 from kurumaisu.critic.predict.scan_matching import trained_matcher
 from kurumaisu.critic.predict.scan_poses import ScanPoses
-from kurumaisu.critic.ranges.scans.beams import why_not_usable
+from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.values.prediction import Prediction
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.settings import Settings

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.processes.worker import ProgressMessage, Worker
-from kurumaisu.critic.ranges.scans.beams import why_not_usable
+from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model, load_model

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.ranges.scans.beams import laser_of, time_zero
+from kurumaisu.critic.ranges.scans.gathering import laser_of, time_zero
 from kurumaisu.critic.sanity import (
     headings,
     imu_match,

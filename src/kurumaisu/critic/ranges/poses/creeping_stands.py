@@ -14,7 +14,8 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE, OUTLIER, neighbours_correlation
 from kurumaisu.critic.ranges.noise.shared_errors import whitened
 from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
-from kurumaisu.critic.ranges.scans.beams import Shots, deviations, gather, hits_of, moved_by_pose, predict, some_scans
+from kurumaisu.critic.ranges.scans.beams import Shots, deviations, hits_of, moved_by_pose, predict, some_scans
+from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import usable_readings
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model

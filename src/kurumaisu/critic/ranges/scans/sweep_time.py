@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
-from kurumaisu.critic.ranges.scans.beams import Shots, Track, gather, hits_of, predict, why_not_usable
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, predict, smoothed
+from kurumaisu.critic.ranges.scans.gathering import gather, why_not_usable
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -19,7 +19,6 @@ from kurumaisu.types import FloatArray
 _COARSER = 1.3  # times the model's angle between beams, from which they may have been thinned out
 _LATER = 0.01  # [s] by which all beams are fired later, to see what a delay does
 _NEAR = 0.1  # [m] beyond which a reading is of another wall
-_SMOOTH = 0.4  # [s] over which poses are averaged: their errors are in the residual, too
 
 
 def with_sweep_time(recording: Recording, model: Model) -> Recording:
@@ -45,7 +44,7 @@ def _share_of_turn(shots: Shots, coarser: float) -> float:
     Beside what a delay does, and a clock that runs fast or slow.
     """
     left = shots.measured - _readings(shots, shots.said)
-    even = replace(shots, tracks=tuple(map(_smoothed, shots.tracks)))
+    even = replace(shots, tracks=tuple(map(smoothed, shots.tracks)))
     now = _readings(even, shots.said)
     slower, later = (_readings(even, said) - now for said in (coarser * shots.said, shots.said + _LATER))
     since = (shots.stamps / max(float(np.abs(shots.stamps).max()), 1.0))[:, np.newaxis]
@@ -59,11 +58,3 @@ def _readings(shots: Shots, said: FloatArray) -> FloatArray:
     """Return what the model reads (k, b) [m] with beams fired at other times (b,) [s] after the stamp."""
     moved = replace(shots, said=said)
     return predict(moved, (), hits_of(moved, (), 0), 0)
-
-
-def _smoothed(track: Track) -> Track:
-    """Return a track with its poses averaged over a time in which a chair hardly changes its rates."""
-    size = max(round(_SMOOTH / float(np.median(np.diff(track.times)))), 1)
-    poses = track.poses.copy()
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    return replace(track, poses=uniform_filter1d(poses, size | 1, axis=0, mode="nearest"))

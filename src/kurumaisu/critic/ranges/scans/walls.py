@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu._core import Scene
+from kurumaisu.critic.ranges.scans.pixel_lines import straightened
 from kurumaisu.types import FloatArray
 from kurumaisu.world import World
 from kurumaisu.world.layout import outline, travels
@@ -15,21 +16,29 @@ from kurumaisu.world.layout import outline, travels
 
 @dataclass(frozen=True)
 class Walls:
-    """Walls at the height of a laser: segments (m, 4), x and y of both ends [m]; returns (m,): reflectance of each."""
+    """Walls at the height of a laser: segments (m, 4), x and y of both ends [m]; returns (m,): reflectance of each.
+
+    drawn: the same as a map of pixels has them, askew ones as stairs; None: there are none, or nobody meets them.
+    """
 
     segments: FloatArray
     returns: FloatArray
+    drawn: Walls | None = None
 
 
 def walls_at(world: World, height: float) -> Walls:
     """Return what a laser at a height [m] sees of a world, without what drives or walks."""
-    borders, returns = [np.empty((0, 6))], [np.empty(0)]
+    lines, borders, returns = [np.empty((0, 4))], [np.empty((0, 4))], []
     for model in world.models:
         if model.ranger_return >= 0 and not travels(model, world.models):
             border = outline(model, world.poses[model.index])
-            borders.append(border[(border[:, 4] <= height) & (border[:, 5] >= height)])
-            returns.append(np.full(len(borders[-1]), model.ranger_return))
-    return Walls(np.concatenate(borders)[:, :4], np.concatenate(returns))
+            borders.append(border[(border[:, 4] <= height) & (border[:, 5] >= height), :4])
+            lines.append(borders[-1] if model.shape.polygons else straightened(borders[-1]))
+            returns.append(model.ranger_return)
+    straight, drawn = (
+        Walls(np.concatenate(each), np.repeat(returns, [len(part) for part in each[1:]])) for each in (lines, borders)
+    )
+    return straight if np.array_equal(straight.segments, drawn.segments) else replace(straight, drawn=drawn)
 
 
 class Rays:
