@@ -30,7 +30,7 @@ from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
 from kurumaisu.critic.engine.form_error import SHARES, form_errors
 from kurumaisu.critic.engine.start_values import StartValues
 from kurumaisu.critic.engine.step_likelihood import StepLikelihood, Walked
-from kurumaisu.critic.noise.base_noise import Noise, whitener
+from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
 from kurumaisu.critic.values.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -205,13 +205,13 @@ class Problem:
     def whitened(self, drive: Drive, columns: FloatArray) -> FloatArray:
         """Return columns (3 m, k) of one of the drives, whitened.
 
-        The reference's heading may be off by as much as it errs at any time throughout a drive: that is noise, too. So
-        is what a drive does in moments that are free.
+        The reference's heading may be off throughout a drive: that is noise, too. So is what a drive does in moments
+        that are free.
         """
         if id(drive) not in self._whiteners:
             white = whitener(drive, self.noise)
-            turned = self.noise.heading_sd * self.noise.louder * _turned(drive)
-            nuisance = np.column_stack([turned, free_columns(drive, self.model)])
+            wandering = min(self.noise.wander, self.noise.heading_sd * self.noise.louder)
+            nuisance = np.column_stack([wandering * turned(drive), free_columns(drive, self.model)])
             self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(nuisance))
         _, white, lasting = self._whiteners[id(drive)]
         return lasting.whiten(white.whiten(columns))
@@ -348,12 +348,6 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
-
-
-def _turned(drive: Drive) -> FloatArray:
-    """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
-    dx, dy, _ = drive.measured.T
-    return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
 
 
 def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:

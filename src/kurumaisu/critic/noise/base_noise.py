@@ -29,7 +29,8 @@ class Noise:
     Ornstein-Uhlenbeck processes of time constant tau [s]; slow_...: the same of a second, slower one, 0: none;
     growth: by how much they grow with the rates, as a share per Drive.pace; rest: share of a moving chair's noise that
     one at rest has; lasting: how many times as large as the white errors of the reference are such that last for
-    lasting_tau [s].
+    lasting_tau [s]; wander [rad]: sd of what the reference's heading may besides be off throughout a drive, at most as
+    much as it errs at any time.
     """
 
     position_sd: float
@@ -46,6 +47,7 @@ class Noise:
     rest: float = 0.02
     lasting: float = 0.0
     lasting_tau: float = 2.0
+    wander: float = 1.0
 
     @property
     def louder(self) -> float:
@@ -80,6 +82,8 @@ _HINTED_LASTING = (0.5, 1.0)  # of what lasts, which are tried with each time co
 _HINTED_TAU = (0.5, 2.0, 8.0)
 # [nat] from which a second colour is believed: it has four parameters; noise at rest and errors that last, too
 _WORTH = 4.0
+_PARTS = 6  # of a drive, between which a heading that wanders differs
+_SLOWEST = 40.0  # [s] time constant of a heading that wanders: a slower one hardly differs
 _ALIKE = 0.08  # share by which a parameter may differ and be the same; about what a few minutes tell
 _NOTHING = 3e-4
 _SAME = 0.03  # share of a column beyond those before it that makes it one of its own
@@ -157,8 +161,13 @@ class NoiseResiduals:
     def estimate(self, start: Noise = START) -> NoiseEstimate:
         """Return the noise of one colour, or of two where they explain more; of a chair at rest as much as it has.
 
-        The reference's errors are white, or last where that explains more.
+        The reference's errors are white, or last where that explains more. What its heading may besides be off is what
+        it does within drives.
         """
+        found = self._coloured(start)
+        return replace(found, noise=replace(found.noise, wander=self._wander(found.noise)))
+
+    def _coloured(self, start: Noise) -> NoiseEstimate:
         plain = replace(start, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0)
         one = self._restless(self._lasting(self._best(plain, _searched(plain))))
         second = start if start.slow_v else _SLOW
@@ -182,6 +191,29 @@ class NoiseResiduals:
             return white
         found = self._best(start, (*_searched(start), *(_SECOND if start.slow_v else ())))
         return found if found.cost < white.cost - _WORTH else white
+
+    def _wander(self, noise: Noise) -> float:
+        """Return what the heading may be off throughout a drive [rad], by how it differs between parts of each."""
+        most = noise.heading_sd * noise.louder
+        if most <= 0:
+            return most
+        count, drives = self._stacked[0].shape[1], len(self._drives)
+        gram = np.zeros(2 * (count + _PARTS * drives,))
+        for i, (drive, columns) in enumerate(zip(self._drives, self._stacked, strict=True)):
+            here = np.r_[:count, count + _PARTS * i : count + _PARTS * (i + 1)]
+            parts = most * turned(drive) * _parts(drive)
+            gram[np.ix_(here, here)] += whitener(drive, noise).gram(np.column_stack([columns, parts]))
+        free = np.zeros((len(gram), count - 1 + drives))  # effects, and each drive as a whole
+        free[1:count, : count - 1] = np.eye(count - 1)
+        free[count:, count - 1 :] = np.kron(np.eye(drives), np.ones((_PARTS, 1)))
+        gram -= gram @ free @ np.linalg.solve(free.T @ gram @ free + 1e-6 * np.eye(free.shape[1]), free.T @ gram)
+        sizes, ways = np.linalg.eigh(gram[count:, count:])
+        pulls, sizes = np.square(ways.T @ gram[count:, 0]), np.maximum(sizes, 0.0)
+        within = np.geomspace(1e-6, 1.0, 121)[:, np.newaxis]  # variances, of `most`
+        likelihood = 0.5 * np.sum(pulls * within / (1 + within * sizes) - np.log1p(within * sizes), axis=1)
+        likely = within[likelihood > likelihood.max() - 0.5].max()
+        length = float(np.median([drive.times[-1] - drive.times[0] for drive in self._drives]))
+        return most * min(float(np.sqrt(likely * _between(length))), 1.0)
 
     def _as_known(self, noise: Noise) -> Noise:
         """Return noise with all errors of the reference as large as they are known to be, if they are."""
@@ -262,6 +294,26 @@ class NoiseResiduals:
         square, b, inner = gram[0, 0], gram[1:, 0], gram[1:, 1:] + 1e-6 * np.eye(len(gram) - 1)
         rest = square - b @ np.linalg.solve(inner, b)
         return 0.5 * float(log_determinant + rest + np.linalg.slogdet(inner)[1])
+
+
+def turned(drive: Drive) -> FloatArray:
+    """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
+    dx, dy, _ = drive.measured.T
+    return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
+
+
+def _parts(drive: Drive) -> FloatArray:
+    """Return in which part of a drive each row lies, (3 m, parts) of 0 and 1."""
+    rows = len(drive.measured)
+    part = np.arange(rows) * _PARTS // max(rows, 1)
+    return np.repeat(np.eye(_PARTS)[part], 3, axis=0)
+
+
+def _between(length: float) -> float:
+    """Return how much more what wanders varies between drives of a length [s] than within them, as a variance."""
+    share = max(length, 1e-3) / _SLOWEST
+    mean = 2 / share * (1 - (1 - np.exp(-share)) / share)
+    return float(mean / (1 - mean))
 
 
 def _searched(noise: Noise) -> tuple[str, ...]:
