@@ -51,7 +51,7 @@ class Sensitivity:
         for axis, derivative in enumerate(self._derivatives[channel]):
             change = derivative @ rates
             out[:, axis] = change if isinstance(change, np.ndarray) else change.toarray()
-        return out.reshape(-1, rates.shape[1])
+        return out.reshape(3 * len(out), rates.shape[1])
 
     def _derivative(self, channel: str) -> Iterator[csr_array]:
         """Yield the derivatives (m, n) of dx, dy and, where a channel turns the chair, of the turn."""

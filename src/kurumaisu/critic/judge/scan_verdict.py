@@ -83,7 +83,7 @@ def criticise_scans(
     assembly = Assembly(gather_stands(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
-    if normal.readings < _FEWEST:
+    if normal.readings < _FEWEST or assembly.shots.walls.stairs:
         return LaserFinding(refused=_too_few(assembly, normal), details=repeatability.sentences(recording, model))
     if (far := large_effect(assembly.shots, ids)) is not None:
         return _large_effect_first(question, assembly, normal, far)
@@ -114,6 +114,11 @@ def criticise_scans(
 def _too_few(assembly: Assembly, normal: NormalEquations) -> str:
     """Return why scans say nothing: what their beams meet."""
     met = int(np.count_nonzero(np.isfinite(assembly.shots.measured) & np.isfinite(assembly.marks.seen.ranges)))
+    if assembly.shots.walls.stairs:
+        return (
+            "the readings have the stairs that askew walls are in a map of pixels, as a simulator's do; stairs are all "
+            "edges, and tell nothing: draw such walls as polygons, in the simulator, too"
+        )
     return (
         f"only {normal.readings} of {met} readings of walls are away from edges of the map, fewer than the {_FEWEST} "
         "that tell anything. Walls made of many small blocks are all edges: draw them as long ones"

@@ -97,7 +97,7 @@ def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Seque
     seen = around[0]
     mean = predict(shots, settings, seen, 0)
     mean = np.where((mean <= shots.laser.range_max) & (mean >= shots.laser.range_min), mean, np.nan)
-    own = np.square(predict(shots, settings, seen, 0, noise=1.0) - mean) + shots.rough**2
+    own = np.square(predict(shots, settings, seen, 0, noise=1.0) - mean)
     moved = np.zeros((3, *mean.shape))
     shared = np.ones((*mean.shape, 4))
     doubt = doubts(shots)

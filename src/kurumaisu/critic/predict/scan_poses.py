@@ -16,7 +16,6 @@ from kurumaisu.critic.predict.motion import Forecast, motion_ahead
 from kurumaisu.critic.predict.reference_path import Paths
 from kurumaisu.critic.ranges.scans.beams import Shots, Track, thin
 from kurumaisu.critic.ranges.scans.gathering import columns_at, gather, past_at, rates_at, together
-from kurumaisu.critic.ranges.scans.stairs import with_stairs
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -47,19 +46,16 @@ class ScanPoses:
         tracks = self._tracks(run, stamps)
         shape = (len(stamps), self._base.laser.beams)
         owner = np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int)
-        shots = replace(
+        return replace(
             self._base,
             tracks=tuple(replace(track, times=track.times - self.zero) for track in tracks),
             stamps=stamps - self.zero,
             run=owner,
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
-            stairs=np.zeros(shape),
-            rough=np.zeros(shape),
             known={**columns_at(run, self._base.known, stamps), **rates_at(tracks, owner, stamps)},
             past=past_at(run, stamps),
         )
-        return with_stairs(shots)
 
     def trained(self) -> list[Shots]:
         """Return shots of the runs to fit, few of them, per run."""
@@ -124,8 +120,6 @@ def joined(parts: Sequence[Shots]) -> Shots:
         run=np.concatenate([part.run + offset for part, offset in zip(parts, offsets, strict=True)]),
         measured=np.concatenate([part.measured for part in parts]),
         shift=np.concatenate([part.shift for part in parts]),
-        stairs=np.concatenate([part.stairs for part in parts]),
-        rough=np.concatenate([part.rough for part in parts]),
         known=together([part.known for part in parts]),
         past=together([part.past for part in parts]),
     )

@@ -56,8 +56,7 @@ class ScatterSimulator:
         rng = np.random.default_rng([seed, 7])
         chain = effects.build_laser(model_effects_with(shots, settings), np.random.default_rng(seed))
         error = shots.laser.error
-        noise, moved = rng.standard_normal(base.shape), self._statistics.pose_errors(rng)
-        raw = read(shots, seen, chain, noise, moved + shots.rough * rng.standard_normal(base.shape))
+        raw = read(shots, seen, chain, rng.standard_normal(base.shape), self._statistics.pose_errors(rng))
         readings = error.reading(error.range(raw), np.zeros_like(raw))
         with np.errstate(invalid="ignore"):
             return readings, np.where(np.isfinite(readings), readings - base, np.nan)

@@ -39,8 +39,6 @@ class Shots:
     inf no return; said (b,) [s] after the stamp at which beams are fired by the model. Times of tracks count alike.
     known: what else was recorded, by name, at each scan (k,), and the chair's rates; past (k, l): of what acts late,
     behind by each of LAGS.
-    stairs (k, b) [m]: how much farther than to the straight walls it is to those drawn in pixels; rough (k, b) [m]: how
-    much that depends on what nobody knows of the poses, 1 sd.
     shift (k, b, 3): how far the tracks have been moved from the reference, to where the readings put the chair. All is
     linearised there; a rate taken from noisy poses would be a noisy covariate.
     """
@@ -54,8 +52,6 @@ class Shots:
     measured: FloatArray
     said: FloatArray
     shift: FloatArray
-    stairs: FloatArray
-    rough: FloatArray
     known: Mapping[str, FloatArray]
     past: Mapping[str, FloatArray]
     zero: float
@@ -64,7 +60,7 @@ class Shots:
 
 @dataclass(frozen=True)
 class BeamHits:
-    """What beams meet, (k, b): ranges [m], level ones without tilt and stairs, incidence [rad], returns [1]; the beams.
+    """What beams meet, (k, b): ranges [m], level ones without tilt, incidence [rad], returns [1]; and the beams.
 
     origins (k, b, 3): poses of the laser when each is fired.
     """
@@ -118,7 +114,7 @@ def hits_of(
     shape = shots.measured.shape
     angles = incidence(rays.ranges, origins, bearings, level).reshape(shape) if like is None else like.incidence
     level = level.reshape(shape)
-    ranges = np.array([slanted(row, each) for row, each in zip(level + shots.stairs, beams, strict=True)])
+    ranges = np.array([slanted(row, each) for row, each in zip(level, beams, strict=True)])
     return BeamHits(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
 
 
@@ -172,8 +168,7 @@ def predict(
 
 def deviations(shots: Shots, seen: BeamHits, base: FloatArray) -> FloatArray:
     """Return the sds (k, b) [m] of readings of mean base (k, b) [m] by the model, the least where nothing is met."""
-    own = np.nan_to_num(predict(shots, (), seen, 0, noise=1.0) - base)
-    return np.hypot(np.maximum(own, _LEAST), shots.rough)
+    return np.maximum(np.nan_to_num(predict(shots, (), seen, 0, noise=1.0) - base), _LEAST)
 
 
 def moved_by_pose(shots: Shots, seen: BeamHits, base: FloatArray | None = None) -> FloatArray:
@@ -205,8 +200,6 @@ def some_scans(shots: Shots, rows: IntArray) -> Shots:
         run=shots.run[rows],
         measured=shots.measured[rows],
         shift=shots.shift[rows],
-        stairs=shots.stairs[rows],
-        rough=shots.rough[rows],
         known={name: values[rows] for name, values in shots.known.items()},
         past={name: values[rows] for name, values in shots.past.items()},
     )

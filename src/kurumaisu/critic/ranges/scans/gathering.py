@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu import effects, geometry
 from kurumaisu.critic.ranges.scans.beams import RATES, Shots, Track
-from kurumaisu.critic.ranges.scans.stairs import with_likelier_walls
+from kurumaisu.critic.ranges.scans.likelier_walls import with_likelier_walls
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.walls import walls_at
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
@@ -88,8 +88,6 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
         measured=readings,
         said=laser.time_increment * np.arange(laser.beams),
         shift=np.zeros((*readings.shape, 3)),
-        stairs=np.zeros(readings.shape),
-        rough=np.zeros(readings.shape),
         known={**together(known), **rates},
         past=together(past),
         zero=zero,

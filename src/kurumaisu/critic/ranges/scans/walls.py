@@ -18,12 +18,14 @@ from kurumaisu.world.layout import outline, travels
 class Walls:
     """Walls at the height of a laser: segments (m, 4), x and y of both ends [m]; returns (m,): reflectance of each.
 
-    drawn: the same as a map of pixels has them, askew ones as stairs; None: there are none, or nobody meets them.
+    drawn: the same as a map of pixels has them, askew ones as stairs; None: it has none, or it is known which they are.
+    stairs: whether most of what might be straight are stairs.
     """
 
     segments: FloatArray
     returns: FloatArray
     drawn: Walls | None = None
+    stairs: bool = False
 
 
 def walls_at(world: World, height: float) -> Walls:

@@ -12,17 +12,15 @@ from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
-_DRAWS = 8  # of poses that err
-_FAR = 0.3  # [m] from a straight wall, where a beam meets another one
 _CLIP = 3.0  # robust sds at which a reading counts as an outlier
 _ROUNDS = 3  # of fitting poses to scans
 _TRIES = 40
+_LEFT = 0.5  # share of the readings of straight walls that are away from edges of stairs, below which too few are left
 _SEARCHED = np.array([0.003, 0.003, 0.001])  # [m, rad] of them about what was fitted, 1 sd, at first
-_FOUND = np.array([0.0005, 0.0005, 0.0002])  # [m, rad] that poses err then, 1 sd
 
 
 def with_likelier_walls(shots: Shots) -> Shots:
-    """Return shots with straight walls in place of pixels, and with their stairs if the readings have them.
+    """Return shots with straight walls in place of pixels, unless the readings have their stairs: then with those.
 
     Whether they have is seen where the scans put the chair: a reference that errs by more than a pixel tells nothing.
     """
@@ -30,43 +28,20 @@ def with_likelier_walls(shots: Shots) -> Shots:
         return shots
     even = replace(shots, tracks=tuple(map(smoothed, shots.tracks)))
     place = _fitted(even)
-    _, walls = _errors(even, place)
+    _, met = _errors(even, place)
     # Pixels have no slopes that lead to where the chair was.
-    straight, _ = _searched(even, place, walls)
-    drawn, there = _searched(replace(even, walls=shots.walls.drawn), place, walls)
-    if not walls.any() or straight < drawn:
+    straight, drawn = (
+        _least_scatter(replace(even, walls=walls), place, met) for walls in (shots.walls, shots.walls.drawn)
+    )
+    if straight < drawn or not met.any():
         return replace(shots, walls=replace(shots.walls, drawn=None))
-    known = _with_stairs(even, there, np.broadcast_to(_FOUND, (len(there), 3)))
-    return replace(shots, stairs=known.stairs, rough=known.rough)
-
-
-def with_stairs(shots: Shots) -> Shots:
-    """Return shots that know the stairs of their walls, as far as those are meant to be met, from the track's poses."""
-    if shots.walls.drawn is None:
-        return shots
-    return _with_stairs(shots, np.zeros_like(shots.shift), _doubt(shots))
+    _, left = _errors(replace(even, walls=shots.walls.drawn), place)
+    return replace(shots, walls=replace(shots.walls.drawn, stairs=bool(left.sum() < _LEFT * met.sum())))
 
 
 def _doubt(shots: Shots) -> FloatArray:
     """Return what the poses of each scan (k, 3) [m, rad] err, 1 sd."""
     return np.array([track.doubt for track in shots.tracks])[shots.run][:, [0, 0, 1]]
-
-
-def _with_stairs(shots: Shots, place: FloatArray, doubt: FloatArray) -> Shots:
-    """Return shots that know their stairs; place (k, b, 3): added to the poses; doubt (k, 3): what they err, 1 sd."""
-    assert shots.walls.drawn is not None
-    each = (replace(shots, walls=shots.walls.drawn), shots)
-    rng = np.random.default_rng(0)
-    offs = []
-    for _ in range(_DRAWS):
-        moved = place + (doubt * rng.standard_normal(doubt.shape))[:, np.newaxis]
-        with np.errstate(invalid="ignore"):
-            off = np.subtract(*(hits_of(one, (), 0, shift=moved).level for one in each))
-        offs.append(np.where(np.abs(off) < _FAR, off, np.nan))
-    many = np.isfinite(offs).sum(axis=0) > 1
-    mean, sd = np.zeros((2, *many.shape))
-    mean[many], sd[many] = np.nanmean(np.array(offs)[:, many], axis=0), np.nanstd(np.array(offs)[:, many], axis=0)
-    return replace(shots, stairs=mean, rough=sd)
 
 
 def _fitted(shots: Shots) -> FloatArray:
@@ -102,18 +77,18 @@ def _errors(shots: Shots, place: FloatArray) -> tuple[FloatArray, BoolArray]:
     return off, usable_beams(shots, seen, base) & np.isfinite(off)
 
 
-def _searched(shots: Shots, place: FloatArray, walls: BoolArray) -> tuple[float, FloatArray]:
-    """Return how far readings of walls scatter [m], a constant apart, and from which place (k, b, 3) least."""
+def _least_scatter(shots: Shots, place: FloatArray, met: BoolArray) -> float:
+    """Return how far readings of walls scatter [m], a constant apart, from the best poses about place (k, b, 3)."""
     rng = np.random.default_rng(0)
     least, best = np.full(len(place), np.inf), place
     far = 0.0
-    for n in range(_TRIES + 1 if walls.any() else 0):
+    for n in range(_TRIES + 1 if met.any() else 0):
         size = _SEARCHED * (1 - n / _TRIES) if n else np.zeros(3)
         tried = best + (size * rng.standard_normal((len(place), 3)))[:, np.newaxis]
-        off = np.where(walls, shots.measured - predict(shots, (), hits_of(shots, (), 0, shift=tried), 0), np.nan)
+        off = np.where(met, shots.measured - predict(shots, (), hits_of(shots, (), 0, shift=tried), 0), np.nan)
         off -= np.nanmedian(off)
         far = far or _CLIP * float(np.nanmedian(np.abs(off)))
         scatter = np.nansum(np.square(np.clip(off, -far, far)), axis=1)
         better = scatter < least
         least, best = np.where(better, scatter, least), np.where(better[:, np.newaxis, np.newaxis], tried, best)
-    return float(np.sqrt(least.sum() / max(walls.sum(), 1))), best
+    return float(np.sqrt(least.sum() / max(met.sum(), 1)))
