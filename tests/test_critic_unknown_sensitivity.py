@@ -67,3 +67,9 @@ def test_waves_that_are_turned_on_from_one_to_the_next_are_waves():
     waved = np.column_stack(list(periods._waves(way, waves))).reshape(len(way), -1, 2)
     phase = 2 * np.pi * np.multiply.outer(way, waves)
     np.testing.assert_allclose(waved, np.stack([np.cos(phase), np.sin(phase)], axis=-1), atol=1e-11)
+
+
+def test_no_rates_do_nothing(drive):
+    motion = replay.motion(drive, MODEL, ())
+    none = Sensitivity(drive, motion).increments("v", np.empty((len(motion.v), 0)))
+    assert none.shape == (drive.measured.size, 0)
