@@ -88,7 +88,7 @@ for _name, _rule in {
     "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
     "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),
     "base.curvature_w": lambda p, v, w: (v, 0, 0.0 if p["curvature"] * abs(w) > 1 else w - p["curvature"] * w * abs(w)),
-    "base.cross_w_to_v": lambda p, v, w: (v + p["lever"] * w, 0.0, w),
+    "base.cross_w_to_v": lambda p, v, w: (v + p["lever"] * (abs(w) if p["even"] >= 0.5 else w), 0.0, w),
     "base.understeer": lambda p, v, w: (v, 0.0, 0.0 if p["k"] * v * v > 1 else w - p["k"] * v * v * w),
     "base.lateral_slip": lambda p, v, w: (v, -p["c"] * v * w, w),
 }.items():

@@ -39,7 +39,8 @@ STATIC = [
         [0.3, 0.4, -0.5, 0.5, 0, 0],
     ),
     ("base.understeer", {"k": 0.2}, V, [0.285, 0.38, -0.5952, 0.5, 0.0, 0.0]),
-    ("base.cross_w_to_v", {"lever": 0.1}, [0.53, -0.46, 0.14, 0.05, 0.0, 1.4], W),
+    ("base.cross_w_to_v", {"lever": 0.1, "even": 0.0}, [0.53, -0.46, 0.14, 0.05, 0.0, 1.4], W),
+    ("base.cross_w_to_v", {"lever": -0.1, "even": 1.0}, V - 0.1 * np.abs(W), W),
     ("base.sign", {"factor_v": -1.0, "factor_w": 2.0, "swap": 0.0}, -V, 2 * W),
     ("base.sign", {"factor_v": 1.0, "factor_w": 1.0, "swap": 1.0}, W, V),
     # 1 % of 1.32402 v + 0.127906 V, or of 2.07369 v - 0.108783 V in reverse, by 1 / -0.499211 or 1 / -0.469278

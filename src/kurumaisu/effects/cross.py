@@ -9,20 +9,28 @@ from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Sta
 
 
 class CrossWToV(Effect):
-    """Forward speed plus a share of the yaw rate: base_link is not on the axis about which the chair turns."""
+    """Forward speed plus a share of the yaw rate: base_link is not on the axis about which the chair turns.
+
+    even: 1 where turns to both sides do the same, as when the wheels that turn it are not alike loaded.
+    """
 
     id = "base.cross_w_to_v"
     stage = Stage.GAIN
-    parameters = (Parameter("lever", "m", null=0.0, scale=0.03, lower=-1.0, upper=1.0),)
+    parameters = (
+        Parameter("lever", "m", null=0.0, scale=0.03, lower=-1.0, upper=1.0),
+        Parameter("even", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
+    )
+    forms = ({"even": 0.0}, {"even": 1.0})
     sentence = "turning moves the chair forward or backward"
-    formula = "v + lever · w"
-    source = "UMBmark 1996; exactly like base.marker_y with y = −lever to a reference pose"
+    formula = "v + lever · w; with even = 1, v + lever · |w|"
+    source = "UMBmark 1996; exactly like base.marker_y with y = −lever to a reference pose, but for even = 1"
     shows_in = Rate.V
     follows = Follows.W
 
     def apply(self, motion: Motion) -> Motion:
         """Add a share of w to v."""
-        return replace(motion, v=motion.v + self.values["lever"] * motion.w)
+        turning = np.abs(motion.w) if self.values["even"] >= 0.5 else motion.w
+        return replace(motion, v=motion.v + self.values["lever"] * turning)
 
 
 class CrossVToW(Effect):
