@@ -168,8 +168,9 @@ class Assembly:
                 z = np.abs(left[k] / self.first.sd[k])[beam.valid[k]]
                 width = max(SIGMA_PER_MAD * float(np.median(z)), 1.0) if len(z) else 1.0
                 out.append(pose_evidence(gram, self.hats[k].rows, width, _BROAD.common_sd))
-            z = np.where(self.first.valid, np.abs(left / self.first.sd), np.nan)
-            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * SIGMA_PER_MAD * np.nanmedian(z)))
+            z = np.where(self.first.valid & np.isfinite(left), np.abs(left / self.first.sd), np.inf)
+            usual = np.median(z[np.isfinite(z)]) if np.isfinite(z).any() else 0.0
+            beam = replace(self.first, valid=self.first.valid & (z < OUTLIER * SIGMA_PER_MAD * usual))
         return out
 
     def _begun(self) -> BeamNoise:
