@@ -27,7 +27,7 @@ def python_files() -> list[Path]:
 
 
 def content_hash(paths: Iterable[Path], *more: str) -> str:
-    """Return a hash of the names and contents of files, and of more text."""
+    """Return a hash of the names and contents of files, the same in all clones, and of more text."""
     digest = hashlib.sha256()
     for path in sorted(paths):
         # what is built may change meanwhile; of a source, what it was when this was asked first
@@ -38,7 +38,8 @@ def content_hash(paths: Iterable[Path], *more: str) -> str:
 
 
 def _digest(path: Path) -> bytes:
-    head = f"{path}\0{path.stat().st_mode}\0".encode()
+    name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
+    head = f"{name}\0{path.stat().st_mode}\0".encode()
     return hashlib.sha256(head + path.read_bytes()).digest()
 
 

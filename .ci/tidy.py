@@ -24,8 +24,9 @@ import sources
 
 BUILD = sources.ROOT / ".ws/build"
 LINKS = sources.ROOT / ".ws/src/kurumaisu"  # the tree as the build sees it
-CLEAN = sources.ROOT / ".ws/tidy"  # one empty file per clean state of a unit
-WHOLE = CLEAN / "whole"  # what is checked at once, in a tree of folders as src/ and tests/ are, with their settings
+# one empty file per clean state of a unit, for all clones of a user, as ccache does
+CLEAN = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "kurumaisu/tidy"
+WHOLE = sources.ROOT / ".ws/tidy"  # what is checked at once, in a tree of folders as src/ and tests/ are, with their settings
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,8 @@ def _units() -> list[Unit]:
 
 def _check(unit: Unit, configs: list[Path], version: str) -> str:
     """Return clang-tidy's findings, empty if there are none."""
-    state = sources.content_hash({*_dependencies(unit), *configs}, version, *unit.flags)
+    flags = [flag.replace(f"{sources.ROOT}/", "") for flag in unit.flags]
+    state = sources.content_hash({*_dependencies(unit), *configs}, version, *flags)
     if (CLEAN / state).exists():
         return ""
     findings = ""
@@ -129,14 +131,13 @@ def _tidy(unit: Unit, path: Path) -> str:
 
 
 def _dependencies(unit: Unit) -> set[Path]:
-    """Return the sources and the headers of this tree that they include, as gcc noted; else all headers."""
+    """Return the sources and the headers that they include, as gcc noted; else all headers of this tree."""
     depfile = Path(f"{unit.made}.d")
     if depfile.exists():
         headers = {Path(name).resolve() for name in depfile.read_text().replace("\\\n", " ").split()[1:]}
     else:
         headers = set(sources.files(".h"))
-    mine = {p for p in headers if p.is_relative_to(sources.ROOT) and p.exists()}
-    return mine | {path.resolve() for path in unit.sources}
+    return {p for p in headers if p.exists()} | {path.resolve() for path in unit.sources}
 
 
 if __name__ == "__main__":

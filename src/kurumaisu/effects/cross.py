@@ -15,7 +15,7 @@ class CrossWToV(Effect):
     """
 
     id = "base.cross_w_to_v"
-    stage = Stage.GAIN
+    stage = Stage.FLOOR  # it follows how the chair turns, as a marker beside base_link does
     parameters = (
         Parameter("lever", "m", null=0.0, scale=0.03, lower=-1.0, upper=1.0),
         Parameter("even", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),

@@ -248,7 +248,9 @@ def _finding(
     confounded = tuple(group for group in groups if matters & set(group))
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
     small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
+    passing = fit.assembly.passing_objects
     details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
+    details += (f"laser: {passing.words}: its readings are set aside.",) if passing.many else ()
     causes, added = with_scatter(causes, settings, scatter.effects)
     causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added})
     confounded += tuple(group for group in map(open_set, scatter.effects) if group)

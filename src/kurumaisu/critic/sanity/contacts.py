@@ -19,7 +19,7 @@ from kurumaisu.types import BoolArray, FloatArray
 TOPIC = "collision"  # a quantity that says so itself
 _ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
 _STANDS = 0.15  # share of that below which it stands
-_BEFORE = 0.6  # [s] for which it must have been asked
+_BEFORE = 0.6  # [s] for which it must have been asked, in whichever axis
 _NOISE = 3.0  # sds of such a rate by errors of the reference, that one which stands may seem to have
 _MOST = 0.5  # share of what it is asked for that it may seem to have by them
 _WINDOW = 0.4  # [s] over which its rates are taken
@@ -54,11 +54,11 @@ def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
     inside = (t > drive.times[0] + _WINDOW) & (t < drive.times[-1] - _WINDOW)
     inside &= run.pose.t[after] - run.pose.t[after - 1] < _WINDOW  # nobody knows what is within a gap
     asked = np.column_stack([drive.v, drive.w])
-    wanted = _held(np.abs(asked) > _ASKED, round(_BEFORE / GRID))
+    wanted = _held((np.abs(asked) > _ASKED).any(axis=1), round(_BEFORE / GRID))
     driven = np.abs(_rates(run.pose, t))
     small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
     small = np.minimum(np.hypot(small, _NOISE * _rate_sds(run.pose)), np.maximum(_MOST * _ASKED, small))
-    stands = inside & wanted.any(axis=1) & (driven < small).all(axis=1)
+    stands = inside & wanted & (driven < small).all(axis=1)
     for a, b in zip(*stretches(stands), strict=True):
         if (b - a) * GRID >= _LEAST and _is_odd(asked[a:b], asked, wanted, stands):
             yield float(t[a]), float(t[b - 1])
@@ -68,13 +68,13 @@ def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: Bool
     """Tell whether the chair moves elsewhere when about the same is asked for."""
     size = np.maximum(np.median(np.abs(here), axis=0), _ASKED)
     as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
-    alike = wanted.any(axis=1) & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
+    alike = wanted & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
     return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
 
 
 def _held(flags: BoolArray, count: int) -> BoolArray:
-    """Return where flags (n, 2) have held for so many samples."""
-    sums = np.vstack([np.zeros(2), np.cumsum(flags, axis=0)])
+    """Return where flags (n,) have held for so many samples."""
+    sums = np.concatenate([[0], np.cumsum(flags)])
     out = np.zeros_like(flags)
     out[count - 1 :] = sums[count:] - sums[:-count] == count
     return out

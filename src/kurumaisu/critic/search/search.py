@@ -121,9 +121,12 @@ class _Search:
                 continue
             if any(one.nats > 0 for one in self.curves.found(fit)[:1]):
                 self.curves.beside(rest)  # beside the curve one of them may be needless
-            others = [g for g in self._proposals(rest, steps=not rest.ids) if g.candidate not in fit.candidates]
+            proposals = self._proposals(rest, steps=not rest.ids)
+            # Lines promise less than a fit keeps, of this one as of a rival that does the same.
+            own = max((g.nats for g in proposals if g.candidate == one), default=np.inf)
+            others = [g for g in proposals if g.candidate not in fit.candidates]
             for guess in others[:_SWAPPED]:
-                if self.bare(rest) + guess.nats > best - _HOPELESS:
+                if guess.nats > min(best - self.bare(rest), own) - _HOPELESS:
                     self._with(rest, guess)
 
     def _with(self, fit: Fit, guess: Guess) -> None:

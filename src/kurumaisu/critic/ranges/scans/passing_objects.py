@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What stands or walks before the walls in some scans, and is not on the map: people, doors, furniture."""
+"""What stands or walks before the walls in some scans, and is not on the map: people, doors, furniture.
+
+Its readings say nothing of the laser: they are set aside, and the rest is judged.
+"""
 
 from __future__ import annotations
 
@@ -7,73 +10,131 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation
+from scipy.spatial import cKDTree
 
+from kurumaisu.critic.ranges.scans.map_changes import FEW
 from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.geometry import wrap
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _NEARER = 0.25  # [m] than the map, and from all that it has nearby: an error of a pose or a stamp moves walls less
 _FEWEST = 4  # neighbouring beams: light of others and tails of the noise do not agree on where something is
 _SMOOTH = 0.1  # [m] between neighbours on one thing
 _WIDEST = 1.2  # [m] of a thing: what is wider, such as the floor before a tilted laser, is none
-_ABOUT = 0.25  # [rad] of bearing, in which the map is looked at
 _MARGIN = 3  # beams on each side that may meet the thing in part
 _SCANS = 5  # in which things stand, before they are told
-_RARER = 3.0  # times as many beams as are longer than the map by as much: an error of the heading makes both alike
+_RARER = 3.0  # times as many as end beyond all walls: an error of the heading makes both alike
+_CELL = 0.15  # [m] of the floor
+_BESIDE = 0.225  # [m] of a place where something stands, within which what ends is of it
+_STAYS = 4  # scans in which a beam towards a cell ends there, at least,
+_ENDS = 0.5  # and their share of those that do or go on: else it is a place where light of others was taken for one
 _COVARIATES = ("time", "hit x", "hit y")
 
 
 @dataclass(frozen=True)
 class PassingObjects:
-    """readings (k, b): of things that the map does not have; scans: with any; nearer [m]: than the map, the median."""
+    """readings (k, b): of things that the map does not have; scans (n,): with any.
+
+    nearer [m]: than the map, the median; place (2,) [m]: where one is in the first of the scans.
+    """
 
     readings: BoolArray
-    scans: int
+    scans: IntArray
     nearer: float
+    place: FloatArray
 
     @property
     def many(self) -> bool:
         """Whether there are enough of them to be told."""
-        return self.scans >= _SCANS
+        return len(self.scans) >= _SCANS
+
+    @property
+    def words(self) -> str:
+        """What is there, and where."""
+        x, y = self.place
+        return (
+            f"in {len(self.scans)} of {len(self.readings)} scans an object that is not in the map stands before its "
+            f"walls, {self.nearer:.2g} m nearer (median), first at x {x:.2f}, y {y:.2f} m"
+        )
 
     def unknowns(self) -> Iterator[Unknown]:
-        """Yield what is outside the catalogue: when it is there, and where."""
-        if self.many:
-            shape = (
-                f"in {self.scans} of {len(self.readings)} scans an object that is not in the map stands before its "
-                f"walls, {self.nearer:.2g} m nearer (median)"
-            )
-            yield from (Unknown(UNKNOWN_CHANNEL, covariate, shape, 1.0) for covariate in _COVARIATES)
+        """Yield what is outside the catalogue where so much is not in the map that the map is what is wrong."""
+        if self.many and self.readings.mean() > FEW:
+            yield from (Unknown(UNKNOWN_CHANNEL, covariate, self.words, 1.0) for covariate in _COVARIATES)
 
 
-def passing_objects(measured: FloatArray, expected: FloatArray, bearings: FloatArray) -> PassingObjects:
-    """Return the readings of things that are not on the map; all others may be of it.
+@dataclass(frozen=True)
+class Sights:
+    """measured, expected (k, b) [m], NaN where there is none; bearings (b,) [rad] of the beams, evenly apart.
 
-    measured, expected (k, b) [m], NaN where there is none; bearings (b,) [rad] of the beams, evenly apart.
+    poses (k, 3): of the laser in the map.
     """
-    nearer = np.nan_to_num(expected - measured)
-    shorter, longer = _runs(measured, nearer > _NEARER), _runs(measured, nearer < -_NEARER)
-    step = abs(float(bearings[1] - bearings[0]))
-    points, walls = (_points(ranges, bearings) for ranges in (measured, expected))
-    out, depths, scans, found = np.zeros(measured.shape, dtype=bool), list[float](), set[int](), 0
-    reach = round(_ABOUT / step)
-    for k, first, stop in shorter:
-        about = walls[k, max(first - reach, 0) : stop + reach]
-        middle = points[k, (first + stop) // 2]
-        wide = (stop - first) * step * float(np.median(measured[k, first:stop])) > _WIDEST
-        if not wide and np.nanmin(np.abs(about - middle)) > _NEARER:
-            out[k, max(first - _MARGIN, 0) : stop + _MARGIN] = True
-            depths.append(float(np.median(nearer[k, first:stop])))
-            scans.add(k)
-            found += stop - first
-    if found < _RARER * sum(stop - first for _, first, stop in longer):
-        return PassingObjects(np.zeros_like(out), 0, 0.0)
-    return PassingObjects(out, len(scans), float(np.median(depths)) if depths else 0.0)
+
+    measured: FloatArray
+    expected: FloatArray
+    bearings: FloatArray
+    poses: FloatArray
+
+    def ends(self, ranges: FloatArray) -> FloatArray:
+        """Return where (k, b, 2) [m] beams of some ranges (k, b) end in the map."""
+        angles = self.poses[:, 2:] + self.bearings
+        way = ranges[..., np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.asarray(self.poses[:, np.newaxis, :2] + way)
 
 
-def _points(ranges: FloatArray, bearings: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-    """Return where readings (k, b) [m] are in the laser's frame, as complex numbers."""
-    return np.asarray(ranges * np.exp(1j * bearings))
+def passing_objects(sights: Sights) -> PassingObjects:
+    """Return the readings of things that are not on the map; all others may be of it."""
+    nearer = np.nan_to_num(sights.expected - sights.measured)
+    off, seen, wide = _off_walls(sights, nearer), np.zeros(nearer.shape, dtype=bool), np.zeros(nearer.shape, dtype=bool)
+    step = abs(float(sights.bearings[1] - sights.bearings[0]))
+    for k, first, stop in _runs(sights.measured, nearer > _NEARER):
+        width = (stop - first) * step * float(np.median(sights.measured[k, first:stop]))
+        (wide if width > _WIDEST else seen)[k, first:stop] = True
+    core = _standing(sights, nearer, off & (nearer > 0) & ~wide) | (seen & off)
+    if core.sum() < _RARER * np.count_nonzero(off & (nearer < 0)) or not core.any():
+        return PassingObjects(np.zeros_like(core), np.empty(0, dtype=np.int64), 0.0, np.zeros(2))
+    scans = np.flatnonzero(core.any(axis=1))
+    place = np.median(sights.ends(sights.measured)[scans[0]][core[scans[0]]], axis=0)
+    readings = binary_dilation(core, np.ones((1, 2 * _MARGIN + 1)))
+    return PassingObjects(readings, scans, float(np.median(nearer[core])), place)
+
+
+def _off_walls(sights: Sights, nearer: FloatArray) -> BoolArray:
+    """Return which readings (k, b) are far off and end where the map has no wall."""
+    far = np.abs(nearer) > _NEARER
+    hits = sights.ends(sights.expected)
+    walls = np.unique(np.floor(hits[np.isfinite(hits).all(axis=2)] / _CELL), axis=0)
+    if far.any():
+        far[far] = cKDTree(walls).query(np.floor(sights.ends(sights.measured)[far] / _CELL))[0] > 1.0
+    return far
+
+
+def _standing(sights: Sights, nearer: FloatArray, off: BoolArray) -> BoolArray:
+    """Return which readings (k, b) end where something stands, however few beams of a scan meet it.
+
+    off (k, b): which are too short, and end where the map has nothing.
+    """
+    ends, out = sights.ends(sights.measured), np.zeros(nearer.shape, dtype=bool)
+    cells, of, counts = np.unique(np.floor(ends[off] / _CELL), axis=0, return_inverse=True, return_counts=True)
+    places = np.column_stack([np.bincount(of.ravel(), ends[off][:, i], len(cells)) for i in (0, 1)]) / counts[:, None]
+    places = places[[_ended(sights, place) for place in places]]
+    if len(places):
+        out[nearer > _SMOOTH] = cKDTree(places).query(ends[nearer > _SMOOTH])[0] < _BESIDE
+    return out
+
+
+def _ended(sights: Sights, place: FloatArray) -> bool:
+    """Tell whether beams towards a place (2,) [m] end there."""
+    towards = place - sights.poses[:, :2]
+    bearing = wrap(np.arctan2(towards[:, 1], towards[:, 0]) - sights.poses[:, 2])
+    step = float(sights.bearings[1] - sights.bearings[0])
+    beam = np.rint((bearing - sights.bearings[0]) / step).astype(np.int64)
+    inside = (beam >= 0) & (beam < len(sights.bearings))
+    off = sights.measured[inside, beam[inside]] - np.hypot(*towards[inside].T)
+    there, beyond = np.count_nonzero(np.abs(off) < _CELL), np.count_nonzero(off >= _CELL)
+    return there >= _STAYS and there >= _ENDS * (there + beyond)
 
 
 def _runs(measured: FloatArray, off: BoolArray) -> Iterator[tuple[int, int, int]]:

@@ -38,7 +38,7 @@ from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stand
 from kurumaisu.critic.ranges.scans.beams import Shots, deviations, model_effects_with, moved_by_pose, some_scans
 from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
 from kurumaisu.critic.ranges.scans.map_changes import map_change
-from kurumaisu.critic.ranges.scans.passing_objects import passing_objects
+from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_objects
 from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
 from kurumaisu.critic.ranges.scans.valid_readings import (
     cut_off_ends,
@@ -93,7 +93,10 @@ class Assembly:
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
-        self.passing_objects = passing_objects(others, self.marks.base, shots.laser.bearings)
+        middle = shots.measured.shape[1] // 2
+        self.passing_objects = passing_objects(
+            Sights(others, self.marks.base, shots.laser.bearings, self.origins()[0][:, middle])
+        )
         self.mapped &= ~self.passing_objects.readings
         self.first = self._trust()
         for i in range(_SHIFTS):
@@ -128,7 +131,7 @@ class Assembly:
         return BeamNoise(sd, 0.0, trust & smooth & self.mapped)
 
     def unknowns(self) -> list[Unknown]:
-        """Return what stands where the map has it not, rides with the chair, or comes and goes."""
+        """Return what stands where the map has it not, or rides with the chair."""
         riding = described(self.blocked, self.shots.measured, self.shots.laser.bearings)
         staying = list(self.map_change.unknowns())
         known = {each.covariate for each in staying}
@@ -136,8 +139,8 @@ class Assembly:
 
     @property
     def unmapped(self) -> bool:
-        """Whether things are there that the map does not have: how far others scatter by them, nobody can say."""
-        return bool(self.map_change.readings.any()) or self.passing_objects.many
+        """Whether a part of the map is not what stands there: how far others scatter by it, nobody can say."""
+        return bool(self.map_change.readings.any())
 
     def hits(self) -> FloatArray:
         """Return where (k, b, 2) [m] the beams meet the map."""
