@@ -294,18 +294,23 @@ def dac_zero_f(p, v_f, v_s, _signs):
 
 @_volts("base.dac_zero_s")
 def dac_zero_s(p, v_f, v_s, signs):
-    """With rests, nobody turns who is told to go straight, or to one side by volts that stand for the other."""
+    """With rests, nobody turns who is told to go straight, or to one side by volts that stand for the other.
 
-    def shifted(v, sign):
+    With rests = -1 who drives straight turns by the offset alone.
+    """
+
+    def shifted(forward, v, sign):
         v += p["offset"]
-        if p["rests"] < 0.5 or math.isnan(sign):
+        if round(p["rests"]) == 0 or math.isnan(sign):
             return v
         if sign == 0:
-            return 0.0
+            to_the_left = p["offset"] / _LAWS["steering"]["positive"]["slope"] > 0
+            end = _LAWS["steering"]["positive" if to_the_left else "negative"]["intercept"]
+            return end + p["offset"] if p["rests"] < 0 and forward != 0 else 0.0
         side = _LAWS["steering"]["positive" if sign > 0 else "negative"]
         return 0.0 if (v - side["intercept"]) / side["slope"] * sign < 0 else v
 
-    return v_f, [shifted(v, sign) for v, sign in zip(v_s, signs, strict=True)]
+    return v_f, [shifted(*each) for each in zip(v_f, v_s, signs, strict=True)]
 
 
 @_volts("base.dac_quantisation")

@@ -257,6 +257,14 @@ def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():
     np.testing.assert_allclose(rests.v_s, [0.0, it.v_s[1] + 0.05])
 
 
+def test_a_steering_without_a_neutral_zone_turns_a_chair_that_is_to_drive_straight():
+    """By its offset alone, as it turns one that is to turn; a chair that is to rest is held by its brakes."""
+    shifted = replace(MODEL, effects=(EffectSetting("base.dac_zero_s", {"offset": -0.02, "rests": -1.0}),))
+    rates = np.array([0.5, 0.5, 0.5, 0.0]), np.array([0.0, 0.4, -0.4, 0.0])
+    out = Plant(shifted, DT, np.random.default_rng(0)).from_rates(*rates)
+    np.testing.assert_allclose(out.w - rates[1], [0.02 / 0.499211, 0.02 / 0.499211, 0.02 / 0.469278, 0.0], atol=1e-9)
+
+
 def test_casters_do_not_turn_a_chair_that_creeps_to_its_rest():
     v = np.concatenate([np.full(10, 0.5), np.full(10, -0.5), -0.5e-3 * 0.5 ** np.arange(10)])
     out = apply("base.caster_reversal", {"kick": 0.1, "length": 0.25}, v, np.where(v > 0, 0.2, 0.0)).w

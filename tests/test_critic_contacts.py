@@ -43,6 +43,21 @@ def test_a_chair_that_is_held_is_seen_by_a_reference_of_uncertain_headings():
     assert HELD[1] - 0.2 < end < HELD[1] + 1.5
 
 
+def test_a_chair_that_is_held_while_other_rates_are_asked_for_is_seen():
+    """Of each alone it is asked for too short a time to tell."""
+    held = 7 * PHASE - 0.6, 7 * PHASE + 0.9
+    ((first, end),) = contacts.contacts(phased(np.random.default_rng(7), held=held), MODEL)
+    assert first == pytest.approx(held[0], abs=0.5)
+    assert held[1] - 0.2 < end < held[1] + 1.5
+
+
+@pytest.mark.parametrize("late", [0.3, 0.5])
+def test_a_chair_that_answers_late_is_not_held_each_time_it_starts(late):
+    for seed in range(5):
+        run = phased(np.random.default_rng(seed), noise=0.002)
+        assert contacts.contacts(replace(run, pose=replace(run.pose, t=run.pose.t + late)), MODEL) == ()
+
+
 def test_what_it_did_while_it_was_held_is_not_judged():
     run = phased(np.random.default_rng(3), held=HELD)
     spans = contacts.contacts(run, MODEL)

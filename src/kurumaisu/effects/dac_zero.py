@@ -32,15 +32,19 @@ class DacZeroS(VoltageEffect):
 
     By equation (2) as printed, a voltage beyond the branch that was meant lies on the other one: the chair turns to
     the wrong side, and fast; and so does V_s = 0 of a chair that was to go straight, with an offset beyond the end of a
-    branch. rests: 1 where it does not turn at all then.
+    branch. rests: 1 where it does not turn at all then; -1 where it turns by as much when it is to drive straight, as
+    with a steering that has no neutral zone.
     """
 
     id = "base.dac_zero_s"
     stage = Stage.CONVERTER
-    parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0))
-    forms = ({"rests": 0.0}, {"rests": 1.0})
+    parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=-1.0, upper=1.0))
+    forms = ({"rests": 0.0}, {"rests": 1.0}, {"rests": -1.0})
     sentence = "the steering voltage has a constant offset"
-    formula = "V_s + offset; with rests = 1, 0 where that is beyond the branch meant, or no turn is"
+    formula = (
+        "V_s + offset; with rests = 1, 0 where that is beyond the branch meant, or no turn is; with rests = −1, "
+        "the end of a branch + offset where the chair is to drive straight"
+    )
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.W
     follows = Follows.W
@@ -48,10 +52,15 @@ class DacZeroS(VoltageEffect):
     def apply(self, volts: Volts) -> Volts:
         """Shift V_s."""
         v_s = volts.v_s + self.values["offset"]
-        if self.values["rests"] < 0.5:
+        if abs(self.values["rests"]) < 0.5:
             return replace(volts, v_s=v_s)
         law = self.context.steering
-        slope = np.where(volts.sign_w < 0, law.negative.slope, law.positive.slope)
-        intercept = np.where(volts.sign_w < 0, law.negative.intercept, law.positive.intercept)
-        beyond = volts.sign_w * (v_s - intercept) / slope < 0  # False where the sign is unknown
-        return replace(volts, v_s=np.where(beyond | (volts.sign_w == 0), 0.0, v_s))
+        side, straight = volts.sign_w, np.zeros(len(v_s), dtype=bool)
+        if self.values["rests"] < 0:
+            straight = (side == 0) & (volts.v_f != 0)
+            side = np.where(straight, np.sign(self.values["offset"] / law.positive.slope), side)
+        slope = np.where(side < 0, law.negative.slope, law.positive.slope)
+        intercept = np.where(side < 0, law.negative.intercept, law.positive.intercept)
+        v_s = np.where(straight, intercept + self.values["offset"], v_s)
+        beyond = side * (v_s - intercept) / slope < 0  # False where the sign is unknown
+        return replace(volts, v_s=np.where(beyond | (side == 0), 0.0, v_s), sign_w=side)

@@ -19,11 +19,12 @@ from kurumaisu.types import BoolArray, FloatArray
 TOPIC = "collision"  # a quantity that says so itself
 _ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
 _STANDS = 0.15  # share of that below which it stands
-_BEFORE = 0.6  # [s] for which it must have been asked, in whichever axis
+_LATEST = 0.6  # [s] by which a chair may answer late
+_BEFORE = 0.2  # [s] beyond that for which it must have been asked, in whichever axis
 _NOISE = 3.0  # sds of such a rate by errors of the reference, that one which stands may seem to have
 _MOST = 0.5  # share of what it is asked for that it may seem to have by them
 _WINDOW = 0.4  # [s] over which its rates are taken
-_LEAST = 0.6  # [s] of standing
+_LEAST = 0.4  # [s] of standing, beyond the window
 _LIKE = (0.7, 1.4)  # times what is asked for, of which it is known what the chair does elsewhere
 _MOVES = 0.7  # share of that time in which it moves, at least
 _MARGINS = (0.4, 1.0)  # [s] before and after, in which it is stopped, and gets going again
@@ -54,8 +55,9 @@ def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
     inside = (t > drive.times[0] + _WINDOW) & (t < drive.times[-1] - _WINDOW)
     inside &= run.pose.t[after] - run.pose.t[after - 1] < _WINDOW  # nobody knows what is within a gap
     asked = np.column_stack([drive.v, drive.w])
-    wanted = _held((np.abs(asked) > _ASKED).any(axis=1), round(_BEFORE / GRID))
     driven = np.abs(_rates(run.pose, t))
+    late = _BEFORE + _answer(np.abs(asked[inside]), driven[inside])
+    wanted = _held((np.abs(asked) > _ASKED).any(axis=1), round(late / GRID))
     small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
     small = np.minimum(np.hypot(small, _NOISE * _rate_sds(run.pose)), np.maximum(_MOST * _ASKED, small))
     stands = inside & wanted & (driven < small).all(axis=1)
@@ -70,6 +72,14 @@ def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: Bool
     as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
     alike = wanted & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
     return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
+
+
+def _answer(asked: FloatArray, driven: FloatArray) -> float:
+    """Return by how much [s] what is driven (n, 2) is behind what is asked, where they are most alike."""
+    one, other = (np.linalg.norm(rates / _ASKED, axis=1) for rates in (asked, driven))
+    shifts = [k for k in range(round(_LATEST / GRID) + 1) if k < len(one) - 1]
+    alike = [one[: len(one) - k] @ other[k:] / max(float(np.linalg.norm(one[: len(one) - k])), 1e-9) for k in shifts]
+    return GRID * shifts[int(np.argmax(alike))] if shifts else _LATEST
 
 
 def _held(flags: BoolArray, count: int) -> BoolArray:
