@@ -24,7 +24,7 @@ from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
 from kurumaisu.critic.heldout.corrected_scans import corrected
 from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
-from kurumaisu.critic.judge.merge import refuted, with_scans
+from kurumaisu.critic.judge.merge import confirmed_scans, refuted, with_scans
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Series
@@ -257,13 +257,31 @@ def test_what_scans_held_out_refuse_is_not_told(tmp_path):
     cause = Cause("laser.scale", 1.0, {}, 30.0)
     turned, curve = (Unknown(channel, "w", "bump", 0.9) for channel in ("reference.heading", "laser.bias"))
     finding = LaserFinding((cause,), unknown=(turned, curve), settings=wrong, details=("first",))
-    assert refuted(finding, worth).unknown == (turned,)
-    left = refuted(replace(finding, unknown=()), worth)
+    assert refuted(finding, worth, frozenset({"laser.scale", "smooth.range.w"})).unknown == (turned,)
+    left, gained, gone = confirmed_scans(replace(finding, unknown=()), worth, lambda _: None)
     assert (left.causes, left.settings, left.details[0]) == ((), (), "first")
+    assert (gained, gone) == (None, {"laser.scale"})
     assert left.details[1].startswith("laser: laser.scale explain")
     told = with_scans(replace(bare(), verdict=Verdict("none")), left)
     assert told.verdict.verdict == "none"
     assert told.settings == ()
+
+
+def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):
+    data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
+    data = replace(data, test=data.train)
+    right, wrong = EffectSetting("laser.scale", {"scale": 0.01}), EffectSetting("laser.quadratic", {"quadratic": 0.02})
+    causes = tuple(Cause(each.id, 1.0, {}, 30.0) for each in (right, wrong))
+    finding = LaserFinding(causes, (("laser.offset", wrong.id),), settings=(right, wrong))
+
+    def measure(gone):
+        return scan_gain.measure(data, MODEL, None, tuple(each for each in (right, wrong) if each.id not in gone))
+
+    left, gained, gone = confirmed_scans(finding, measure(frozenset()), measure)
+    assert gone == {wrong.id}
+    assert (left.causes, left.confounded, left.settings) == (causes[:1], (), (right,))
+    assert gained.log_density_per_sample.lo90 > 0
+    assert "laser.quadratic explain" in left.details[-1]
 
 
 def test_a_verdict_of_before_is_still_read(tmp_path):

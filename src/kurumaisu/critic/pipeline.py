@@ -16,7 +16,7 @@ from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
-from kurumaisu.critic.judge.merge import refuted, with_scans
+from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
 from kurumaisu.critic.judge.reference_point import from_base_link
 from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
@@ -29,7 +29,7 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.verdict import verdict_text
+from kurumaisu.critic.values.verdict import ChannelGain, verdict_text
 from kurumaisu.errors import Error
 from kurumaisu.whole_files import write_whole
 
@@ -77,10 +77,12 @@ def criticise(
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
     stamped = with_elapsed_time(stamped)
     progress("measuring the gain on held-out scans")
-    worth = scan_gain.measure(stamped, model, forecast, settings)
-    if worth is not None and scans.settings and worth.log_density_per_sample.hi90 < 0:
-        settings = tuple(each for each in settings if each not in scans.settings)
-        scans, worth = refuted(scans, worth), None
+
+    def worth_without(gone: frozenset[str]) -> ChannelGain | None:
+        return scan_gain.measure(stamped, model, forecast, tuple(each for each in settings if each.id not in gone))
+
+    scans, worth, gone = confirmed_scans(scans, worth_without(frozenset()), worth_without)
+    settings = tuple(each for each in settings if each.id not in gone)
     found = with_scan_gain(with_scans(found, scans), worth)
     if slam:
         progress("running SLAM with both models")

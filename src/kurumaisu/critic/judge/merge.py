@@ -3,8 +3,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
+from kurumaisu import effects
 from kurumaisu.critic.experiment.proposal import LISTED_IDS
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
@@ -68,23 +70,47 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
 
 
-def refuted(finding: LaserFinding, worth: ChannelGain) -> LaserFinding:
+def confirmed_scans(
+    finding: LaserFinding, worth: ChannelGain | None, measure: Callable[[frozenset[str]], ChannelGain | None]
+) -> tuple[LaserFinding, ChannelGain | None, frozenset[str]]:
+    """Return a finding without what scans held out refuse, what the rest is worth, and the ids of what is gone.
+
+    worth: of all of it; measure: returns that without some ids. Where one loses it all, the others stay.
+    """
+    if worth is None or not finding.settings or worth.log_density_per_sample.hi90 >= 0:
+        return finding, worth, frozenset()
+    ids = frozenset(setting.id for setting in finding.settings)
+    each = {name: measure(frozenset({name})) for name in sorted(ids)} if len(ids) > 1 else {}
+    kept = {
+        name: gained.log_density_per_sample.gain
+        for name, gained in each.items()
+        if gained is not None and gained.log_density_per_sample.hi90 >= 0
+    }
+    if not kept:
+        return refuted(finding, worth, ids), None, ids
+    lost = max(kept, key=lambda name: kept[name])
+    return refuted(finding, worth, frozenset({lost})), each[lost], frozenset({lost})
+
+
+def refuted(finding: LaserFinding, worth: ChannelGain, gone: frozenset[str]) -> LaserFinding:
     """Return a finding without what predicts scans held out worse than the model does, which is chance's.
 
     What extends no model, an error of the reference's poses, was not asked of them, and stays.
     """
     density = worth.log_density_per_sample
-    named = ", ".join(sorted({setting.id for setting in finding.settings}))
     words = (
-        f"laser: {named} explain the scans that they were found in, but on scans held out they lose "
+        f"laser: {', '.join(sorted(gone))} explain the scans that they were found in, but on scans held out they lose "
         f"{-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), so they are not told."
     )
-    return LaserFinding(
-        unknown=tuple(each for each in finding.unknown if each.channel in _POSES),
+    strange = any(name.startswith(effects.SMOOTH) for name in gone)
+    return replace(
+        finding,
+        causes=tuple(cause for cause in finding.causes if cause.id not in gone),
+        confounded=tuple(group for group in finding.confounded if not gone & set(group)),
+        unknown=tuple(one for one in finding.unknown if one.channel in _POSES or not strange),
+        settings=tuple(setting for setting in finding.settings if setting.id not in gone),
         details=(*finding.details, words),
         pictures=Pictures(noise=finding.pictures.noise),
-        small=finding.small,
-        next_experiment=finding.next_experiment,
     )
 
 
