@@ -26,7 +26,7 @@ BUILD = sources.ROOT / ".ws/build"
 LINKS = sources.ROOT / ".ws/src/kurumaisu"  # the tree as the build sees it
 # one empty file per clean state of a unit, for all clones of a user, as ccache does
 CLEAN = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "kurumaisu/tidy"
-WHOLE = sources.ROOT / ".ws/tidy"  # what is checked at once, in a tree of folders as src/ and tests/ are, with their settings
+WHOLE = sources.ROOT / ".ws/tidy"  # what is checked at once, in folders as src/ and tests/, with their settings
 
 
 @dataclass(frozen=True)

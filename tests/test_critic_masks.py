@@ -53,6 +53,13 @@ def test_an_excursion_of_a_second_is_set_aside(seed, start):
     assert f"off at t = {start + 25.01:.2f} s to {start + 25.96:.2f} s: 20 of its 1200 rows set aside" in told
 
 
+@pytest.mark.parametrize("rows", [[500, 502], [500, 502, 504], [500, 503]])
+def test_rows_that_are_off_by_turns_with_good_ones_are_set_aside(rows):
+    run = moved(phased(np.random.default_rng(1)), rows)
+    pose, _ = judged(run)
+    assert_without(pose, run, rows)
+
+
 def test_several_of_them_are_told_in_one_line():
     rows = [300, *range(500, 510), 800]
     run = moved(phased(np.random.default_rng(4)), rows)

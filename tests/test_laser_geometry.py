@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Where tilted, late and displaced beams go, how they meet walls, and walls that are not where the map has them."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -43,6 +43,11 @@ def test_geometry_at_chosen_values():
     i = np.arange(N)
     np.testing.assert_allclose(chain("laser.latency", delay=0.02).aim(beams()).times, 9.98 + 0.01 * i)
     np.testing.assert_allclose(chain("laser.clock_skew", skew=0.01).aim(beams()).times, (10 + 0.01 * i) / 1.01)
+    in_a_run = replace(beams(), start=4.0)
+    np.testing.assert_allclose(chain("laser.clock_skew", skew=0.01).aim(in_a_run).times, 4 + (6 + 0.01 * i) / 1.01)
+    np.testing.assert_allclose(
+        chain("laser.clock_skew", skew=0.01, through=1.0).aim(in_a_run).times, (10 + 0.01 * i) / 1.01
+    )
     np.testing.assert_allclose(chain("laser.sweep", stretch=0.5).aim(beams()).times, 10 + 0.015 * i)
     np.testing.assert_allclose(chain("laser.sweep", stretch=-1.0).aim(beams()).times, 10.0)
 

@@ -69,9 +69,12 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     """Return first row, end and distance [m] of each stretch that is off."""
     lasting, single = jumps(pose, 1.0, command)
     step = np.diff(pose.values[:, :2], axis=0)
-    found = [(i, i + 1, float(np.hypot(*step[i - 1]))) for i in single if i + 1 < len(pose.t)]
-    # One that is off alone leaves twice: on its way out, and back.
-    found = [one for k, one in enumerate(found) if not k or one[0] > found[k - 1][0] + 1]
+    found: list[tuple[int, int, float]] = []
+    back = 0
+    for i in single:
+        if i != back and i + 1 < len(pose.t):
+            found.append((i, i + 1, float(np.hypot(*step[i - 1]))))
+            back = i + 1  # one that is off alone leaves twice: on its way out, and back
     away: int | None = None
     for i in lasting:
         if away is None:

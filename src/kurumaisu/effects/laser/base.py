@@ -38,7 +38,8 @@ class Beams:
     """Where the beams of a scan leave from, and when.
 
     stamp [s]: what the message will say; times (n,) [s] at which the beams are fired; mount (3,): base_from_laser;
-    height [m] of the laser above the floor; bearings, elevations (n,) [rad] in the frame that the mount gives.
+    height [m] of the laser above the floor; bearings, elevations (n,) [rad] in the frame that the mount gives; start
+    [s]: of the run.
     """
 
     stamp: float
@@ -47,6 +48,7 @@ class Beams:
     height: float
     bearings: FloatArray
     elevations: FloatArray
+    start: float = 0.0
 
     @classmethod
     def single(cls, stamp: float = 0.0) -> Beams:

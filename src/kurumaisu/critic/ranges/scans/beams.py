@@ -103,7 +103,7 @@ def hits_of(
     for effect in effects.build_world(every, np.random.default_rng([seed, 1])):
         segments = effect.apply(segments)
     rays = Rays(replace(shots.walls, segments=segments))
-    beams = [chain.aim(_stated_beams(shots, stamp)) for stamp in shots.stamps.tolist()]
+    beams = [chain.aim(_stated_beams(shots, scan)) for scan in range(len(shots.stamps))]
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
@@ -121,14 +121,15 @@ def hits_of(
 def firing_times(shots: Shots, scan: int) -> FloatArray:
     """Return when the beams (b,) [s] of a scan leave by the model, its own effects at work."""
     chain = effects.build_laser(shots.own, np.random.default_rng(0))
-    return chain.aim(_stated_beams(shots, float(shots.stamps[scan]))).times
+    return chain.aim(_stated_beams(shots, scan)).times
 
 
-def _stated_beams(shots: Shots, stamp: float) -> Beams:
+def _stated_beams(shots: Shots, scan: int) -> Beams:
     """Return the beams of a scan as its message says."""
-    place = shots.laser.mount
+    place, stamp, bearings = shots.laser.mount, float(shots.stamps[scan]), shots.laser.bearings
     mount = np.array([place.x, place.y, place.yaw])
-    return Beams(stamp, stamp + shots.said, mount, place.z, shots.laser.bearings, np.zeros(shots.laser.beams))
+    start = float(shots.tracks[shots.run[scan]].times[0])
+    return Beams(stamp, stamp + shots.said, mount, place.z, bearings, np.zeros(len(bearings)), start)
 
 
 def poses_at(shots: Shots, times: FloatArray) -> FloatArray:

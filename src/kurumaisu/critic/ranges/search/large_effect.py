@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 
 import numpy as np
@@ -36,11 +37,12 @@ def large_effect(shots: Shots, ids: frozenset[str] | None) -> EffectSetting | No
         return None
     own = {setting.id for setting in shots.own}
     known = [effect for effect in effects.LASER if effect.id not in own and effect.stage <= LaserStage.BIAS]
-    tried = [sought.best(effect) for effect in known if ids is None or effect.id in ids]
+    asked = [effect for effect in known if ids is None or effect.id in ids]
+    tried = [sought.best(effect, form) for effect in asked for form in effect.forms or ({},)]
     ranked = sorted(tried, key=lambda each: -each[0])
     if not ranked or ranked[0][0] < _MOST or not issubclass(effects.by_id(ranked[0][1].id), BeamEffect):
         return None
-    rival = max((share for share, _ in ranked[1:]), default=plain)
+    rival = max((share for share, other in ranked if other.id != ranked[0][1].id), default=plain)
     return ranked[0][1] if rival - plain < _ALTERNATIVE * (ranked[0][0] - plain) else None
 
 
@@ -58,9 +60,9 @@ class _SizeSearch:
         near = off[self._seen] < _TOLERANCE[0] + _TOLERANCE[1] * self._measured[self._seen]
         return float(near.mean()) if near.size else 1.0
 
-    def best(self, effect: type[Mechanism]) -> tuple[float, EffectSetting]:
-        """Return the greatest share with one of an effect's parameters off its null, and the setting."""
-        null = {p.name: p.null for p in effect.parameters}
+    def best(self, effect: type[Mechanism], form: Mapping[str, float]) -> tuple[float, EffectSetting]:
+        """Return the greatest share with one of an effect's parameters off its null, in a form, and the setting."""
+        null = {p.name: p.null for p in effect.parameters} | dict(form)
         out = (0.0, EffectSetting(effect.id, null))
         for p in effect.parameters:
 

@@ -254,6 +254,9 @@ class EffectColumns:
         pairs: list[dict[str, float]] = [{}]
         grids: dict[str, list[float]] = {}
         for parameter in shaping:
+            if chosen := [form[parameter.name] for form in effect.forms if parameter.name in form]:
+                grids[parameter.name] = chosen
+                continue
             grid = grid_of(parameter, float(np.ptp(self._shots.stamps)) or 1.0)
             units = np.array([_unit(self._slope(effect, acting[0], {parameter.name: value})) for value in grid])
             sizes = np.linalg.svd(units, compute_uv=False)
