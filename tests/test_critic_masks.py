@@ -60,6 +60,13 @@ def test_rows_that_are_off_by_turns_with_good_ones_are_set_aside(rows):
     assert_without(pose, run, rows)
 
 
+def test_a_reference_that_jumps_about_until_it_is_back_is_set_aside():
+    run = moved(moved(moved(phased(np.random.default_rng(2)), [500]), np.arange(501, 504), -2 * OFF), [503], 3 * OFF)
+    pose, (told,) = judged(run)
+    assert_without(pose, run, np.arange(500, 504))
+    assert "4 of its 1200 rows set aside" in told
+
+
 def test_several_of_them_are_told_in_one_line():
     rows = [300, *range(500, 510), 800]
     run = moved(phased(np.random.default_rng(4)), rows)

@@ -14,10 +14,10 @@ from kurumaisu.critic.sanity.pose_jumps import jumps
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import Model
-from kurumaisu.types import BoolArray, FloatArray
+from kurumaisu.types import BoolArray
 
 _BACK = 5.0  # [s] within which a reference that was elsewhere is back
-_SAME = 0.5  # share of a jump that is left when it is back
+_SAME = 0.5  # share of its first jump that is left when it is back
 _MOST = 0.05  # share of a run's rows that may be set aside
 
 
@@ -66,29 +66,26 @@ def _masked(run: Run) -> tuple[Run, list[str]]:
 
 
 def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
-    """Return first row, end and distance [m] of each stretch that is off."""
+    """Return first row, end and distance [m] of each stretch that is off, however it jumps about meanwhile."""
     lasting, single = jumps(pose, 1.0, command)
     step = np.diff(pose.values[:, :2], axis=0)
     found: list[tuple[int, int, float]] = []
-    back = 0
-    for i in single:
-        if i != back and i + 1 < len(pose.t):
-            found.append((i, i + 1, float(np.hypot(*step[i - 1]))))
-            back = i + 1  # one that is off alone leaves twice: on its way out, and back
-    away: int | None = None
-    for i in lasting:
-        if away is None:
-            away = i
-        elif pose.t[i] - pose.t[away] < _BACK and _is_back(step[away - 1], step[i - 1]):
-            found.append((away, i, float(np.hypot(*step[away - 1]))))
-            away = None
-        else:
-            away = i
-    return sorted(found)
-
-
-def _is_back(out: FloatArray, back: FloatArray) -> bool:
-    return bool(np.hypot(*(out + back)) < _SAME * np.hypot(*out))
+    away, last = 0, 0  # rows at which it left, and jumped last
+    off, far = np.zeros(2), 0.0  # how far it is off, and was at most
+    for i in sorted({*lasting, *single}):
+        if away in single and last == away and i > away + 1:
+            found.append((away, away + 1, far))  # its way back was no jump
+            away = 0
+        if not away or pose.t[i] - pose.t[away] >= _BACK:
+            away, off, far = i, np.zeros(2), 0.0
+        off, last = off + step[i - 1], i
+        far = max(far, float(np.hypot(*off)))
+        if np.hypot(*off) < _SAME * np.hypot(*step[away - 1]):
+            found.append((away, i, far))
+            away = 0
+    if away in single and last == away and away + 1 < len(pose.t):
+        found.append((away, away + 1, far))
+    return found
 
 
 def _without(pose: Series, off: BoolArray) -> Series:
