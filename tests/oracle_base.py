@@ -127,8 +127,8 @@ def cross_v_to_w(p, v, w):
 
 def _swallowed(axis, rate, p):
     """The voltage is moved by the width towards the branch's threshold, which it does not pass; or jumps there."""
-    if rate == 0:
-        return 0.0
+    if rate == 0 or (round(p["side"]) and (rate > 0) != (p["side"] > 0)):
+        return rate
     slope, intercept = branch(axis, rate)
     width = p["width"] * (abs(slope / branch(axis, 1.0)[0]) if p["even"] >= 0.5 else 1.0)
     above = volts(axis, rate) - intercept

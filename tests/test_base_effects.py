@@ -257,6 +257,16 @@ def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():
     np.testing.assert_allclose(rests.v_s, [0.0, it.v_s[1] + 0.05])
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_dead_zone_of_one_branch_leaves_the_other_as_it_is(side):
+    values = {"width": 0.02, "even": 0.0, "whole": 0.0, "side": side}
+    v = np.array([0.5, -0.5, 0.005, -0.005, 0.0])
+    both = apply("base.dead_zone_v", {**values, "side": 0.0}, v, np.zeros(5)).v
+    out = apply("base.dead_zone_v", values, v, np.zeros(5)).v
+    np.testing.assert_array_equal(out, np.where(v * side > 0, both, v))
+    assert (both[2:] == 0).all()
+
+
 def test_a_steering_without_a_neutral_zone_turns_a_chair_that_is_to_drive_straight():
     """By its offset alone, as it turns one that is to turn; a chair that is to rest is held by its brakes."""
     shifted = replace(MODEL, effects=(EffectSetting("base.dac_zero_s", {"offset": -0.02, "rests": -1.0}),))
