@@ -257,6 +257,19 @@ def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():
     np.testing.assert_allclose(rests.v_s, [0.0, it.v_s[1] + 0.05])
 
 
+def test_turning_moves_the_chair_as_it_turns_not_as_it_was_asked_to():
+    """Else a lag would tell it from a marker beside base_link, which it is exactly like."""
+    acting = (
+        EffectSetting("base.lag_w", {"tau": 0.2}),
+        EffectSetting("base.understeer", {"k": 0.3}),
+        EffectSetting("base.cross_w_to_v", {"lever": 0.1, "even": 0.0}),
+    )
+    v, w = np.full(200, 0.4), np.where(np.arange(200) < 80, 0.5, -0.3)
+    out = Plant(replace(MODEL, effects=acting), DT, np.random.default_rng(0)).from_rates(v, w)
+    np.testing.assert_allclose(out.v - v, 0.1 * out.w, atol=1e-12)
+    assert np.abs(out.w - w).max() > 0.1
+
+
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_dead_zone_of_one_branch_leaves_the_other_as_it_is(side):
     values = {"width": 0.02, "even": 0.0, "whole": 0.0, "side": side}
