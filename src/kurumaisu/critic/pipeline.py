@@ -29,7 +29,7 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.verdict import ChannelGain, verdict_text
+from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
 from kurumaisu.whole_files import write_whole
 
@@ -77,12 +77,9 @@ def criticise(
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
     stamped = with_elapsed_time(stamped)
     progress("measuring the gain on held-out scans")
-
-    def worth_without(gone: frozenset[str]) -> ChannelGain | None:
-        return scan_gain.measure(stamped, model, forecast, tuple(each for each in settings if each.id not in gone))
-
-    scans, worth, gone = confirmed_scans(scans, worth_without(frozenset()), worth_without)
-    settings = tuple(each for each in settings if each.id not in gone)
+    beside = tuple(each for each in settings if each not in scans.settings)
+    scans, worth = confirmed_scans(scans, lambda told: scan_gain.measure(stamped, model, forecast, (*told, *beside)))
+    settings = (*scans.settings, *beside)
     found = with_scan_gain(with_scans(found, scans), worth)
     if slam:
         progress("running SLAM with both models")

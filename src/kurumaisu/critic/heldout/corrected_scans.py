@@ -56,7 +56,8 @@ def corrected(
     flat = np.zeros(laser.beams)
     said = laser.time_increment * np.arange(laser.beams)
     mount = np.array([laser.mount.x, laser.mount.y, laser.mount.yaw])
-    beams = [chain.aim(Beams(t, t + said, mount, laser.mount.z, laser.bearings, flat)) for t in stamps.tolist()]
+    begun = float(run.scan.t[0])
+    beams = [chain.aim(Beams(t, t + said, mount, laser.mount.z, laser.bearings, flat, begun)) for t in stamps.tolist()]
     readings = run.scan.values[list(rows)]
     first = laser.error.range(readings) if known else readings
     ranges = np.array(

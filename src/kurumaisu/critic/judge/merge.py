@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
 from dataclasses import replace
+from operator import itemgetter
 
 from kurumaisu import effects
 from kurumaisu.critic.experiment.proposal import LISTED_IDS
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import ChannelGain, Kind, Verdict
 
 _NOTHING_SAID = "none"
@@ -71,36 +73,38 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
 
 
 def confirmed_scans(
-    finding: LaserFinding, worth: ChannelGain | None, measure: Callable[[frozenset[str]], ChannelGain | None]
-) -> tuple[LaserFinding, ChannelGain | None, frozenset[str]]:
-    """Return a finding without what scans held out refuse, what the rest is worth, and the ids of what is gone.
+    finding: LaserFinding, measure: Callable[[Settings], ChannelGain | None]
+) -> tuple[LaserFinding, ChannelGain | None]:
+    """Return a finding without what scans held out refuse, and what the rest is worth.
 
-    worth: of all of it; measure: returns that without some ids. Where one loses it all, the others stay.
+    measure: returns what settings are worth. Where one of them loses it all, the others stay.
     """
+    worth = measure(finding.settings)
     if worth is None or not finding.settings or worth.log_density_per_sample.hi90 >= 0:
-        return finding, worth, frozenset()
-    ids = frozenset(setting.id for setting in finding.settings)
-    each = {name: measure(frozenset({name})) for name in sorted(ids)} if len(ids) > 1 else {}
-    kept = {
-        name: gained.log_density_per_sample.gain
-        for name, gained in each.items()
-        if gained is not None and gained.log_density_per_sample.hi90 >= 0
-    }
+        return finding, worth
+    ids = {setting.id for setting in finding.settings}
+    kept: list[tuple[float, LaserFinding, ChannelGain]] = []
+    for name in sorted(ids) if len(ids) > 1 else ():
+        rest = refuted(finding, worth, {name})
+        gained = measure(rest.settings)
+        if gained is not None and gained.log_density_per_sample.hi90 >= 0:
+            kept.append((gained.log_density_per_sample.gain, rest, gained))
     if not kept:
-        return refuted(finding, worth, ids), None, ids
-    lost = max(kept, key=lambda name: kept[name])
-    return refuted(finding, worth, frozenset({lost})), each[lost], frozenset({lost})
+        return refuted(finding, worth, ids), None
+    _, rest, gained = max(kept, key=itemgetter(0))
+    return rest, gained
 
 
-def refuted(finding: LaserFinding, worth: ChannelGain, gone: frozenset[str]) -> LaserFinding:
+def refuted(finding: LaserFinding, worth: ChannelGain, gone: Set[str]) -> LaserFinding:
     """Return a finding without what predicts scans held out worse than the model does, which is chance's.
 
     What extends no model, an error of the reference's poses, was not asked of them, and stays.
     """
     density = worth.log_density_per_sample
     words = (
-        f"laser: {', '.join(sorted(gone))} explain the scans that they were found in, but on scans held out they lose "
-        f"{-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), so they are not told."
+        f"laser: {', '.join(sorted(gone))} explain the scans that they were found in, but with all that was found "
+        f"scans held out lose {-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), "
+        "so they are not told."
     )
     strange = any(name.startswith(effects.SMOOTH) for name in gone)
     return replace(

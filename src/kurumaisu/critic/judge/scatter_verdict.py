@@ -55,7 +55,7 @@ def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | N
     own: the sd [m] of whole scans in the model.
     """
     assembly, made, fit = mean.assembly, mean.made, mean.fit
-    if fit.assembly.unmapped:
+    if fit.assembly.map_change.readings.any():  # how far others scatter by it, nobody can say
         return Scatter([], [], ())
     away = 0.0 if made.winner is None else block_evidence.wall_error(made.winner, mean.normal.gram)
     found = _of_readings(assembly, fit, ids, strange=made.curve, away=away)

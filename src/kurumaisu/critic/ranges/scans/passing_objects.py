@@ -87,36 +87,38 @@ class Sights:
 def passing_objects(sights: Sights) -> PassingObjects:
     """Return the readings of things that are not on the map; all others may be of it."""
     nearer = np.nan_to_num(sights.expected - sights.measured)
-    off, seen, wide = _off_walls(sights, nearer), np.zeros(nearer.shape, dtype=bool), np.zeros(nearer.shape, dtype=bool)
+    ends = sights.ends(sights.measured)
+    off = _off_walls(sights, ends, nearer)
+    seen, wide = np.zeros((2, *nearer.shape), dtype=bool)
     step = abs(float(sights.bearings[1] - sights.bearings[0]))
     for k, first, stop in _runs(sights.measured, nearer > _NEARER):
         width = (stop - first) * step * float(np.median(sights.measured[k, first:stop]))
         (wide if width > _WIDEST else seen)[k, first:stop] = True
-    core = _standing(sights, nearer, off & (nearer > 0) & ~wide) | (seen & off)
+    core = _standing(sights, ends, nearer, off & (nearer > 0) & ~wide) | (seen & off)
     if core.sum() < _RARER * np.count_nonzero(off & (nearer < 0)) or not core.any():
         return PassingObjects(np.zeros_like(core), np.empty(0, dtype=np.int64), 0.0, np.zeros(2))
     scans = np.flatnonzero(core.any(axis=1))
-    place = np.median(sights.ends(sights.measured)[scans[0]][core[scans[0]]], axis=0)
+    place = np.median(ends[scans[0]][core[scans[0]]], axis=0)
     readings = binary_dilation(core, np.ones((1, 2 * _MARGIN + 1)))
     return PassingObjects(readings, scans, float(np.median(nearer[core])), place)
 
 
-def _off_walls(sights: Sights, nearer: FloatArray) -> BoolArray:
-    """Return which readings (k, b) are far off and end where the map has no wall."""
+def _off_walls(sights: Sights, ends: FloatArray, nearer: FloatArray) -> BoolArray:
+    """Return which readings (k, b) are far off and end (k, b, 2) [m] where the map has no wall."""
     far = np.abs(nearer) > _NEARER
     hits = sights.ends(sights.expected)
     walls = np.unique(np.floor(hits[np.isfinite(hits).all(axis=2)] / _CELL), axis=0)
     if far.any():
-        far[far] = cKDTree(walls).query(np.floor(sights.ends(sights.measured)[far] / _CELL))[0] > 1.0
+        far[far] = cKDTree(walls).query(np.floor(ends[far] / _CELL))[0] > 1.0
     return far
 
 
-def _standing(sights: Sights, nearer: FloatArray, off: BoolArray) -> BoolArray:
+def _standing(sights: Sights, ends: FloatArray, nearer: FloatArray, off: BoolArray) -> BoolArray:
     """Return which readings (k, b) end where something stands, however few beams of a scan meet it.
 
     off (k, b): which are too short, and end where the map has nothing.
     """
-    ends, out = sights.ends(sights.measured), np.zeros(nearer.shape, dtype=bool)
+    out = np.zeros(nearer.shape, dtype=bool)
     cells, of, counts = np.unique(np.floor(ends[off] / _CELL), axis=0, return_inverse=True, return_counts=True)
     places = np.column_stack([np.bincount(of.ravel(), ends[off][:, i], len(cells)) for i in (0, 1)]) / counts[:, None]
     places = places[[_ended(sights, place) for place in places]]

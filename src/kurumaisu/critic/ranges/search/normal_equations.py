@@ -137,11 +137,6 @@ class Assembly:
         known = {each.covariate for each in staying}
         return [*riding, *staying, *(each for each in self.passing_objects.unknowns() if each.covariate not in known)]
 
-    @property
-    def unmapped(self) -> bool:
-        """Whether a part of the map is not what stands there: how far others scatter by it, nobody can say."""
-        return bool(self.map_change.readings.any())
-
     def hits(self) -> FloatArray:
         """Return where (k, b, 2) [m] the beams meet the map."""
         poses, bearings = self.origins()
