@@ -53,7 +53,7 @@ def test_an_excursion_of_a_second_is_set_aside(seed, start):
     assert f"off at t = {start + 25.01:.2f} s to {start + 25.96:.2f} s: 20 of its 1200 rows set aside" in told
 
 
-@pytest.mark.parametrize("rows", [[500, 502], [500, 502, 504], [500, 503]])
+@pytest.mark.parametrize("rows", [[500, 502], [500, 502, 504], [500, 503], [500, 501], [500, 501, 503]])
 def test_rows_that_are_off_by_turns_with_good_ones_are_set_aside(rows):
     run = moved(phased(np.random.default_rng(1)), rows)
     pose, _ = judged(run)
@@ -65,6 +65,24 @@ def test_a_reference_that_jumps_about_until_it_is_back_is_set_aside():
     pose, (told,) = judged(run)
     assert_without(pose, run, np.arange(500, 504))
     assert "4 of its 1200 rows set aside" in told
+
+
+@pytest.mark.parametrize("rows", [[500], [500, 501, 502]])
+@pytest.mark.parametrize("by", [[0.02, -0.02, 0.0], [0.0, 0.0, 0.15]])
+def test_rows_that_are_off_by_less_than_a_jump_are_set_aside(rows, by):
+    run = moved(phased(np.random.default_rng(4)), rows, by)
+    pose, (told,) = judged(run)
+    assert_without(pose, run, rows)
+    assert f"off for a moment at t = 25.01 s: {len(rows)} of its 1200 rows set aside" in told
+
+
+@pytest.mark.parametrize("late", [0.1, 0.4])
+def test_a_chair_that_is_late_is_off_for_long_and_nothing_is_set_aside(late):
+    run = phased(np.random.default_rng(5))
+    later = replace(run, pose=replace(run.pose, t=run.pose.t + late))
+    pose, told = judged(later)
+    assert told == ()
+    assert len(pose.t) == len(run.pose.t)
 
 
 def test_several_of_them_are_told_in_one_line():

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.critic.sanity import imu_match
+from kurumaisu.critic.sanity.brief_errors import brief_errors
 from kurumaisu.critic.sanity.contacts import TOPIC, contacts
 from kurumaisu.critic.sanity.pose_jumps import jumps
 from kurumaisu.critic.values.digits import moment, quantities
@@ -28,7 +29,7 @@ def set_aside(recording: Recording, model: Model) -> Recording:
     """
     runs, notes = [], []
     for run in recording.runs:
-        kept, words = _masked(run)
+        kept, words = _masked(run, model)
         held = contacts(kept, model)
         turned, odd = imu_match.odd(kept)
         others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
@@ -52,7 +53,7 @@ def _held(run: Run, spans: Sequence[tuple[float, float]]) -> str:
     )
 
 
-def _masked(run: Run) -> tuple[Run, list[str]]:
+def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
     pose = run.pose
     if pose is None or run.pose_source != "measured":
         return run, []
@@ -60,9 +61,16 @@ def _masked(run: Run) -> tuple[Run, list[str]]:
     off = np.zeros(len(pose.t), dtype=np.bool_)
     for first, end, _ in spans:
         off[first:end] = True
-    if not off.any() or off.mean() > _MOST:
+    if off.mean() > _MOST:
         return run, []
-    return replace(run, pose=_without(pose, off)), [_told(run.name, pose, spans, off)]
+    kept, words = (replace(run, pose=_without(pose, off)), [_told(run.name, pose, spans, off)]) if spans else (run, [])
+    assert kept.pose is not None
+    brief = brief_errors(kept, model)
+    if not brief.any() or brief.mean() > _MOST:
+        return kept, words
+    begun = moment(float(kept.pose.t[int(np.argmax(brief))]))
+    more = f"{run.name}: the reference is off for a moment at t = {begun}: {_rows(brief)}"
+    return replace(kept, pose=_without(kept.pose, brief)), [*words, more]
 
 
 def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
@@ -73,7 +81,7 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     away, last = 0, 0  # rows at which it left, and jumped last
     off, far = np.zeros(2), 0.0  # how far it is off, and was at most
     for i in sorted({*lasting, *single}):
-        if away in single and last == away and i > away + 1:
+        if away in single and last == away and i > away + 1 and _alone(pose, away):
             found.append((away, away + 1, far))  # its way back was no jump
             away = 0
         if not away or pose.t[i] - pose.t[away] >= _BACK:
@@ -83,9 +91,15 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
         if np.hypot(*off) < _SAME * np.hypot(*step[away - 1]):
             found.append((away, i, far))
             away = 0
-    if away in single and last == away and away + 1 < len(pose.t):
+    if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
         found.append((away, away + 1, far))
     return found
+
+
+def _alone(pose: Series, row: int) -> bool:
+    """Tell whether the row after one that jumped is back where it jumped from."""
+    jump, left = pose.values[row : row + 2, :2] - pose.values[row - 1, :2]
+    return bool(np.hypot(*left) < _SAME * np.hypot(*jump))
 
 
 def _without(pose: Series, off: BoolArray) -> Series:
@@ -100,7 +114,8 @@ def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: Boo
         else f"t = {moment(float(pose.t[first]))}"
     )
     more = f", and {len(spans) - 1} more" if len(spans) > 1 else ""
-    return (
-        f"{name}: the reference is {quantities([far], 'm')[0]} off at {where}{more}: "
-        f"{int(off.sum())} of its {len(off)} rows set aside ({100 * off.mean():.2g} %)"
-    )
+    return f"{name}: the reference is {quantities([far], 'm')[0]} off at {where}{more}: {_rows(off)}"
+
+
+def _rows(off: BoolArray) -> str:
+    return f"{int(off.sum())} of its {len(off)} rows set aside ({100 * off.mean():.2g} %)"
