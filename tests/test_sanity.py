@@ -75,6 +75,14 @@ def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
     assert "times of arrival" in told["all"]
 
 
+def test_poses_of_another_drive_have_nothing_to_do_with_what_was_asked_for():
+    tables, other = (drives.make(case(None, 0.0), np.random.default_rng(seed)) for seed in (7, 8))
+    good = sanity.findings_of_tables(tables, ["command", "voltage", "pose"], None)
+    tables["pose"] = other["pose"]
+    assert good == []
+    assert any("nothing to do" in line for line in sanity.findings_of_tables(tables, ["command", "pose"], None))
+
+
 QUICK = (
     "map shifted",
     "beams reversed",

@@ -134,7 +134,8 @@ def _of_run(run: Run, model: Model) -> list[str]:
         for line in _against(name, part, pose if measured else None, rates, model, follows[name])
     ]
     for name, match, number in known:
-        told += [*match.words, *input_match.sign_and_unit(match, number, name)]
+        signs = input_match.sign_and_unit(match, number, name)
+        told += [*match.words, *(signs or input_match.unrelated(match, number, name))]
     # Of poses that are mirrored every input seems to have the wrong sign; by another law some voltages have.
     reflected = found is not None and found.factor < 0
     words += [line for line in told if not ((reflected or not lawful) and "wrong sign" in line)]

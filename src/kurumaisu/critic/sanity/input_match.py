@@ -25,6 +25,8 @@ _PIECES = 240.0  # [s] of a drive that are compared
 _FEWEST_TURNS = 12  # changes of the input below which nearly any pace of the clocks would do
 _PIECE = 100.0  # [s] of the drive that the scales are tried on
 _ALIKE = 0.7  # least correlation of a reading that is said
+_UNLIKE = 0.5  # largest correlation, and factor, of a motion that has nothing to do with its input
+_ENOUGH = 40.0  # independent samples from which that is said
 _LEAST = (0.02, 0.02)  # [m/s], [rad/s] sd of an input below which it says nothing
 _PLAIN = (0.2, 5.0)  # factors between asked and driven that the catalogue explains, unless they are a unit's
 _NEAR = 0.2  # relative distance from a unit's factor, where the catalogue has factors like it
@@ -208,6 +210,22 @@ def sign_and_unit(match: Match, number: float, name: str) -> list[str]:
         if sure[i]:
             words += _unit_words(float(sizes[i]), abs(float(match.correlation[i])), units, i)
     return words
+
+
+def unrelated(match: Match, number: float, name: str) -> list[str]:
+    """Return in words that a motion has nothing to do with its input, where it moves otherwise, whenever that was.
+
+    number: of independent samples.
+    """
+    known = np.isfinite(match.factor)
+    small = (np.abs(match.correlation[known]) < _UNLIKE) & (np.abs(match.factor[known]) < _UNLIKE)
+    if match.words or number < _ENOUGH or not known.any() or not small.all():
+        return []
+    best = float(np.abs(match.correlation[known]).max())
+    return [
+        f"the motion has nothing to do with its {name} (correlation of the rates: {best:.2f} at most): are the poses "
+        f"those of another drive?"
+    ]
 
 
 def _sure(correlation: float, number: float) -> bool:
