@@ -288,8 +288,10 @@ def caster_reversal(p, drive):
 
 @_volts("base.dac_zero_f")
 def dac_zero_f(p, v_f, v_s, _signs):
-    """Nobody drives a chair that creeps at rest: its brakes hold it."""
-    return [v + p["offset"] if v else v for v in v_f], v_s
+    """Nobody drives a chair that creeps at rest: its brakes hold it; with rests = -1 it has none, and no dead zone."""
+    side = _LAWS["translation"]["positive" if p["offset"] > 0 else "negative"]
+    at_rest = side["intercept"] + p["offset"] if p.get("rests", 0.0) < 0 and p["offset"] else 0.0
+    return [v + p["offset"] if v else at_rest for v in v_f], v_s
 
 
 @_volts("base.dac_zero_s")
@@ -326,7 +328,14 @@ def dac_quantisation(p, v_f, v_s, signs):
     if p["step"] == 0:
         return v_f, v_s
     v_f, v_s = ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] for volts in (v_f, v_s))
-    if p["rests"] < 0.5:  # a turn is never just 0 V
+    if p["rests"] < 0:  # nobody turns to the other side than was meant
+        sides = {1: _LAWS["steering"]["positive"], -1: _LAWS["steering"]["negative"]}
+        other = [
+            sign in sides and (v - sides[sign]["intercept"]) / sides[sign]["slope"] * sign < 0
+            for v, sign in zip(v_s, signs, strict=True)
+        ]
+        v_s = [0.0 if it else (v or 1e-12 * sign) for v, sign, it in zip(v_s, signs, other, strict=True)]
+    elif p["rests"] < 0.5:  # a turn is never just 0 V
         v_s = [1e-12 if v == 0 and sign in (-1, 1) else v for v, sign in zip(v_s, signs, strict=True)]
     return v_f, v_s
 

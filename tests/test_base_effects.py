@@ -257,6 +257,27 @@ def test_a_voltage_beyond_its_branch_is_the_other_side_or_rest():
     np.testing.assert_allclose(rests.v_s, [0.0, it.v_s[1] + 0.05])
 
 
+def test_steps_beyond_the_end_of_a_branch_are_rest_or_the_other_side():
+    """A left turn of 0.05 rad/s is 0.0792 V, and no turn 0.1042 V; the nearest level is 0.12 V, a right turn."""
+    it = effects.Volts(np.zeros(2), CONTEXT.steering.volts(np.array([0.05, 0.5])), np.zeros(2), np.ones(2))
+    form = {"step": 0.12, "phase": 0.0, "cut": 0.0}
+    jumps, rests = (
+        effects.by_id("base.dac_quantisation")({**form, "rests": rests}, CONTEXT).apply(it) for rests in (0.0, -1.0)
+    )
+    np.testing.assert_allclose(jumps.v_s, [0.12, -0.12])
+    np.testing.assert_allclose(rests.v_s, [0.0, -0.12])
+
+
+@pytest.mark.parametrize("offset", [0.02, -0.02])
+def test_a_chair_without_brakes_creeps_at_rest_by_an_offset(offset):
+    """As fast as it is then faster when it drives: there is no neutral zone in which the offset is lost."""
+    effect = EffectSetting("base.dac_zero_f", {"offset": offset, "rests": -1.0})
+    plant = Plant(replace(MODEL, effects=(effect,)), DT, np.random.default_rng(0))
+    side = MODEL.translation.positive if offset > 0 else MODEL.translation.negative
+    v = plant.from_rates(np.array([0.0, 0.3]), np.zeros(2)).v
+    np.testing.assert_allclose(v, [offset / side.slope, 0.3 + offset / MODEL.translation.positive.slope], atol=1e-9)
+
+
 def test_turning_moves_the_chair_as_it_turns_not_as_it_was_asked_to():
     """Else a lag would tell it from a marker beside base_link, which it is exactly like."""
     acting = (

@@ -6,25 +6,36 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu.effects.base import Follows, Parameter, Rate, Stage, VoltageEffect, Volts
+from kurumaisu.effects.branch import beyond_branch, end_of_branch
 
 _OFFSET = (Parameter("offset", "V", null=0.0, scale=0.01, lower=-0.5, upper=0.5),)
+_RESTS = Parameter("rests", "1", null=0.0, scale=1.0, lower=-1.0, upper=1.0)
 
 
 class DacZeroF(VoltageEffect):
-    """V_f plus a constant; a chair asked to rest is held by its brakes, however far V_f is off then."""
+    """V_f plus a constant; a chair asked to rest is held by its brakes, however far V_f is off then.
+
+    rests: -1 where it creeps by as much then, as without brakes and neutral zone.
+    """
 
     id = "base.dac_zero_f"
     stage = Stage.CONVERTER
-    parameters = _OFFSET
+    parameters = (*_OFFSET, _RESTS)
+    forms = ({"rests": 0.0}, {"rests": -1.0})
     sentence = "the translation voltage has a constant offset"
-    formula = "V_f + offset, 0 at rest"
+    formula = "V_f + offset, 0 at rest; with rests = −1, the end of a branch + offset at rest"
     source = "offset error of any D/A converter; 2-20 mV"
     shows_in = Rate.V
     follows = Follows.V
 
     def apply(self, volts: Volts) -> Volts:
         """Shift V_f."""
-        return replace(volts, v_f=np.where(volts.v_f == 0, 0.0, volts.v_f + self.values["offset"]))
+        offset, rests = self.values["offset"], volts.v_f == 0
+        if self.values["rests"] > -0.5:
+            return replace(volts, v_f=np.where(rests, 0.0, volts.v_f + offset))
+        law = self.context.translation
+        side = np.where(rests, np.sign(offset / law.positive.slope), volts.sign_v)
+        return replace(volts, v_f=np.where(rests, end_of_branch(law, side), volts.v_f) + offset, sign_v=side)
 
 
 class DacZeroS(VoltageEffect):
@@ -38,7 +49,7 @@ class DacZeroS(VoltageEffect):
 
     id = "base.dac_zero_s"
     stage = Stage.CONVERTER
-    parameters = (*_OFFSET, Parameter("rests", "1", null=0.0, scale=1.0, lower=-1.0, upper=1.0))
+    parameters = (*_OFFSET, _RESTS)
     forms = ({"rests": 0.0}, {"rests": 1.0}, {"rests": -1.0})
     sentence = "the steering voltage has a constant offset"
     formula = (
@@ -59,8 +70,6 @@ class DacZeroS(VoltageEffect):
         if self.values["rests"] < 0:
             straight = (side == 0) & (volts.v_f != 0)
             side = np.where(straight, np.sign(self.values["offset"] / law.positive.slope), side)
-        slope = np.where(side < 0, law.negative.slope, law.positive.slope)
-        intercept = np.where(side < 0, law.negative.intercept, law.positive.intercept)
-        v_s = np.where(straight, intercept + self.values["offset"], v_s)
-        beyond = side * (v_s - intercept) / slope < 0  # False where the sign is unknown
+        v_s = np.where(straight, end_of_branch(law, side) + self.values["offset"], v_s)
+        beyond = beyond_branch(law, v_s, side)
         return replace(volts, v_s=np.where(beyond | (side == 0), 0.0, v_s), sign_w=side)
