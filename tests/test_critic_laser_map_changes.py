@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laser_scene import recording
+from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.gathering import gather
@@ -158,6 +158,17 @@ def test_somebody_who_walks_by_is_set_aside_and_is_not_taken_for_light_of_others
     assert not finding.unknown
     assert {cause.id for cause in finding.causes} == {"laser.mount_x"}
     assert any("not in the map stands before its walls" in line for line in finding.details)
+
+
+def test_where_far_walls_are_cut_off_what_stands_before_them_is_no_other_map(tmp_path):
+    """Of a wall beyond the longest reading nothing is left but what now and then stands before it."""
+    data = sparse(recording(tmp_path, None, 0.0, 5, scans=100))
+    (run,) = data.runs
+    ranges = run.scan.values.copy()
+    near = np.random.default_rng(1).random(ranges.shape) < 0.01
+    ranges = np.where(ranges > 2.5, np.where(near, 0.6 * ranges, 2.5), ranges)
+    cut = replace(data, runs=(replace(run, scan=replace(run.scan, values=ranges)),))
+    assert not Assembly(gather(cut, MODEL)).map_change.readings.any()
 
 
 def test_a_wall_that_is_not_where_the_map_has_it_is_unknown(tmp_path):

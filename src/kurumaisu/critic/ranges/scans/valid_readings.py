@@ -9,11 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from kurumaisu import geometry
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
+from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.types import BoolArray, FloatArray
 
 _KINK = 1e-4  # departure from a straight wall, where 1/r(i+1) + 1/r(i-1) = 2 cos(increment) / r(i), relative to 1/r
 _BESIDE = 0.025  # [rad] on each side of a corner or jump, a beam at least: errors of pose or mounting move it so far
+_BEFORE = 0.1  # [m] by which a wall's end stands before what a beam meets that passes it
 # [rad] oblique beyond this, a beam slides along the wall with every error of the pose, which then acts by its square,
 # too; and what becomes of a footprint four times as long as wide is another equation for everybody.
 _STEEPEST = np.radians(75.0)
@@ -52,8 +55,38 @@ def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 
     reach [m]: as of edges.
     """
     inside = (base > shots.laser.range_min + GATE) & (base < shots.laser.range_max - GATE)
-    beside = edges(seen, shots.laser.angle_increment, reach)
+    increment = shots.laser.angle_increment
+    beside = edges(seen, increment, reach) if increment <= _BESIDE else _edges_between(shots, seen, reach)
     return np.asarray(inside & ~beside & (seen.incidence < _STEEPEST))
+
+
+def _edges_between(shots: Shots, seen: BeamHits, reach: float) -> BoolArray:
+    """Return the same as edges of a fan whose beams are too far apart to tell what is beside each of them."""
+    rays, origins = Rays(shots.walls), seen.origins.reshape(-1, 3)
+    bearings = np.concatenate([each.bearings for each in seen.beams])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        aside = _BESIDE + reach / np.nan_to_num(seen.level.ravel(), posinf=np.inf)
+        right, near, left = (1 / rays.cast(origins, bearings + side * aside)[0] for side in (-1.0, 0.0, 1.0))
+        bent = ~(near > 0) | ~(np.abs(left + right - 2 * np.cos(aside) * near) <= _KINK * near)
+    return np.asarray(bent.reshape(seen.level.shape) | _passes_ends(shots, seen, reach))
+
+
+def _passes_ends(shots: Shots, seen: BeamHits, reach: float) -> BoolArray:
+    """Return (k, b) which beams pass the end of a wall that stands before the one they meet, however thin it is."""
+    out, laser = np.zeros(seen.level.shape, dtype=np.bool_), shots.laser
+    ends = np.unique(shots.walls.segments.reshape(-1, 2), axis=0)
+    for row, origins, level in zip(out, seen.origins, seen.level, strict=True):
+        middle = origins[len(origins) // 2]
+        bearings = geometry.wrap(np.arctan2(*(ends - middle[:2]).T[::-1]) - middle[2])
+        nearest = np.rint((bearings - laser.bearings[0]) / laser.angle_increment).astype(int)
+        for beam in (nearest - 1, nearest, nearest + 1):
+            known = (beam >= 0) & (beam < len(origins))
+            which, end = beam[known], ends[known]
+            aim = origins[which] + laser.bearings[which, np.newaxis] * np.array([0.0, 0.0, 1.0])
+            ahead = geometry.between(aim, np.column_stack([end, np.zeros(len(end))]))
+            along, across = ahead[:, 0], np.abs(ahead[:, 1])
+            row[which[(along > 0) & (along < level[which] - _BEFORE) & (across < _BESIDE * along + reach)]] = True
+    return out
 
 
 def usable_readings(shots: Shots, seen: BeamHits, base: FloatArray) -> BoolArray:

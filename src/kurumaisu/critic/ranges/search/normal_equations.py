@@ -42,6 +42,7 @@ from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_object
 from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
 from kurumaisu.critic.ranges.scans.valid_readings import (
     cut_off_ends,
+    inside_ends,
     pose_weights,
     usable_beams,
     usable_readings,
@@ -88,8 +89,11 @@ class Assembly:
         self._linearise(shots, roughly=True)
         self.motion: list[MotionEvidence] | None = None
         self.blocked = blocked_beams(shots.measured, self.marks.base)
-        somewhere = without_cut_off(shots.measured, cut_off_ends(shots.measured, self.marks.base))
-        self.map_change = map_change(somewhere, self.marks.base, self.hits(), self.marks.seen.incidence)
+        ends = cut_off_ends(shots.measured, self.marks.base)
+        somewhere = without_cut_off(shots.measured, ends)
+        # Where readings of the map's own walls are cut off, only what stands before them is left.
+        kept = np.where(inside_ends(self.marks.base, ends), self.marks.base, np.nan)
+        self.map_change = map_change(somewhere, kept, self.hits(), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
