@@ -207,16 +207,26 @@ def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatc
     assert not untested(made, None, ())
 
 
+@pytest.mark.parametrize(("without", "kept"), [(0.15, True), (0.25, False), (-0.1, True)])
+def test_a_curve_does_not_live_on_what_the_effects_beside_it_are_worth(monkeypatch, without, kept):
+    monkeypatch.setattr("kurumaisu.critic.judge.explain_unknown.is_reported", lambda *_: True)
+    curve = SimpleNamespace(fit=fit_of("a", 40.0))
+    made = decision({"a": 1.0}, fit_of("a", 40.0), extension=curve)
+    other, worth = confirmed_part(made, gain(0.2), lambda _: gain(without))
+    assert (other.extension is curve) is kept
+    assert worth == gain(0.2 if kept else without)
+
+
 @pytest.mark.parametrize(("told", "without", "kept"), [(True, 0.2, True), (False, 0.2, False), (False, -0.1, True)])
 def test_a_curve_that_does_not_hold_hides_no_effects_that_do(monkeypatch, told, without, kept):
     """Where nobody would be told of it, what acts without it is told, if that is confirmed."""
     monkeypatch.setattr("kurumaisu.critic.judge.explain_unknown.is_reported", lambda *_: told)
-    made = decision({"a": 1.0}, fit_of("a", 40.0), extension=SimpleNamespace())
+    made = decision({"a": 1.0}, fit_of("a", 40.0), extension=SimpleNamespace(fit=fit_of("", 0.0)))
     other, worth = confirmed_part(made, gain(-0.1), lambda one: gain(without if one.extension is None else -0.1))
     assert (other is made) is kept
     assert worth == gain(-0.1 if kept else 0.2)
     assert other.found is made.found
-    alone = decision({"a": 0.0}, fit_of("", 40.0), extension=SimpleNamespace())
+    alone = decision({"a": 0.0}, fit_of("", 40.0), extension=SimpleNamespace(fit=fit_of("", 0.0)))
     assert confirmed_part(alone, gain(-0.1), lambda _: gain(0.2)) == (alone, gain(-0.1))  # there is nothing else
 
 

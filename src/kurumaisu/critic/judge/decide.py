@@ -68,6 +68,14 @@ class Decision:
         )
 
 
+@dataclass(frozen=True)
+class Hint:
+    """What may act beside what was found: the best of other sets, or one with a curve."""
+
+    found: SearchResult
+    curve: SetWithCurve | None
+
+
 def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     """Return what acts in drives of which only a first noise is known.
 
@@ -77,14 +85,14 @@ def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
     found = search.search(first, progress)
     curve = likelier_curve(found)
     made = _settled(first, found, curve, _noise_about(first, found, curve, truth, progress), truth, progress)
-    hint = _hinted_curve(first, found) if made.extension is None and found.enough else None
-    if hint is None:
+    other = _hinted(first, found, progress) if made.extension is None and found.enough else None
+    if other is None:
         return made
-    growth, density = _noise_about(first, found, hint, truth, progress), _density(made)
-    if _density_with(first.changed(noise=growth.noise), hint, found) < density + _HINT:
+    growth, density = _noise_about(first, other.found, other.curve, truth, progress), _density(made)
+    if _density_with(first.changed(noise=growth.noise), other) < density + _HINT:
         return made
-    other = _settled(first, found, hint, growth, truth, progress)
-    return other if other.extension is not None and _density(other) > density + _LEAST else made
+    anew = _settled(first, other.found, other.curve, growth, truth, progress)
+    return anew if _density(anew) > density + _LEAST else made
 
 
 def _settled(
@@ -130,17 +138,21 @@ def _noise_about(
     return growth if growth.p > 1 / 2 else replace(growth, noise=final.noise)
 
 
-def _hinted_curve(problem: Problem, found: SearchResult) -> SetWithCurve | None:
-    """Return the best curve beside nothing or what was found, if that may well act were nothing slow in the noise."""
-    noise = problem.noise
-    easy = problem.changed(noise=replace(noise, slow_v=0.0, slow_lateral=0.0, slow_w=0.0, lasting=0.0))
+def _hinted(problem: Problem, found: SearchResult, progress: Progress) -> Hint | None:
+    """Return what may well act were nothing slow in the noise: what lasts for long may be the one or the other."""
+    easy = problem.changed(noise=problem.noise.quick)
+    if not base_noise.alike(easy.noise, problem.noise):
+        progress("looking again, as if no noise were slow")
+        again = search.search(easy, progress, found.best)
+        curve = likelier_curve(again)
+        return Hint(again, curve) if curve is not None or again.best.ids != found.best.ids else None
     curves = CurveSearch(easy)
     sets = {frozenset(): found.empty, found.best.candidates: found.best}
     fits = [easy.fit_candidates(chosen, fit.start if chosen else {}) for chosen, fit in sets.items()]
     tried = [one for fit in fits for one in curves.beside(fit)[:1] if one.form_of is None]
     best = max(tried, key=found.log_posterior, default=None)
     bare = max(map(found.log_posterior, fits))
-    return best if best is not None and found.log_posterior(best) > bare + _HINT else None
+    return Hint(found, best) if best is not None and found.log_posterior(best) > bare + _HINT else None
 
 
 def _log_density(problem: Problem, log_posterior: float) -> float:
@@ -154,11 +166,14 @@ def _density(made: Decision) -> float:
     return _log_density(made.problem, made.found.log_posterior(likelier_curve(made.found) or made.found.best))
 
 
-def _density_with(problem: Problem, curve: SetWithCurve, found: SearchResult) -> float:
-    """Return the same of a set with the best curve beside it in a problem, before other sets are sought there."""
-    fit, curves = problem.fit_candidates(curve.fit.candidates, curve.fit.start), CurveSearch(problem)
+def _density_with(problem: Problem, hint: Hint) -> float:
+    """Return the same of what a hint says in a problem, before other sets are sought there."""
+    if hint.curve is None:
+        fit = problem.fit_candidates(hint.found.best.candidates, hint.found.best.start)
+        return _log_density(problem, hint.found.log_posterior(fit))
+    fit, curves = problem.fit_candidates(hint.curve.fit.candidates, hint.curve.fit.start), CurveSearch(problem)
     curves.closer(fit)
-    return max(_log_density(problem, found.log_posterior(one)) for one in curves.beside(fit)[:1])
+    return max(_log_density(problem, hint.found.log_posterior(one)) for one in curves.beside(fit)[:1])
 
 
 def likelier_curve(found: SearchResult) -> SetWithCurve | None:

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit
 from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed, expected_nats
@@ -28,7 +30,10 @@ def confirmed_part(
     if gain is None:
         return made, gain
     if made.extension is not None:
-        return (made, gain) if explain_unknown.is_reported(made, gain) else _without_curves(made, gain, measure)
+        told = explain_unknown.is_reported(made, gain)
+        if told and not made.extension.fit.ids:
+            return made, gain
+        return _without_curves(made, gain, measure, gain.log_density_per_sample.gain if told else -np.inf)
     if confirmed(gain, found.nats(found.best)):
         return made, gain
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
@@ -67,13 +72,19 @@ def _unconfirmed(made: Decision, held: Gain) -> bool:
     return made.extension is None and nats >= CERTAIN and not confirmed(held, nats)
 
 
-def _without_curves(made: Decision, gain: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
-    """Return what acts if no curve does, where that is confirmed: a curve that is not must not hide it."""
+def _without_curves(
+    made: Decision, gain: Gain, measure: Callable[[Decision], Gain], least: float
+) -> tuple[Decision, Gain]:
+    """Return what acts if no curve does, where that is confirmed: a curve that is not must not hide it.
+
+    least: per sample, what it must be worth besides [nat]: a curve shares in what the effects beside it are worth.
+    """
     other = replace(made, extension=None)
     if not other.something:
         return made, gain
     gained = measure(other)
-    return (other, gained) if confirmed(gained, other.found.nats(other.found.best)) else (made, gain)
+    held = confirmed(gained, other.found.nats(other.found.best)) and gained.log_density_per_sample.gain >= least
+    return (other, gained) if held else (made, gain)
 
 
 def _with_best(made: Decision, fit: Fit) -> Decision:

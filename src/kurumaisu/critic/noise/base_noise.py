@@ -54,6 +54,23 @@ class Noise:
         """How many times as large as the white errors of the reference all its errors together are."""
         return float(np.hypot(1.0, self.lasting))
 
+    @property
+    def quick(self) -> Noise:
+        """Return the noise without what lasts: within _BRIEF it is as loud."""
+        first, second = (min(1.0, float(np.sqrt(_BRIEF / tau))) for tau in (self.tau, self.slow_tau))
+        return replace(
+            self,
+            sd_v=first * self.sd_v,
+            sd_lateral=first * self.sd_lateral,
+            sd_w=first * self.sd_w,
+            tau=min(self.tau, _BRIEF),
+            slow_v=second * self.slow_v,
+            slow_lateral=second * self.slow_lateral,
+            slow_w=second * self.slow_w,
+            slow_tau=min(self.slow_tau, _BRIEF) if self.slow_v else self.slow_tau,
+            lasting=0.0,
+        )
+
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
 START = Noise(position_sd=0.01, heading_sd=0.005, sd_v=0.02, sd_lateral=0.005, sd_w=0.03, tau=0.3)
@@ -82,6 +99,7 @@ _HINTED_LASTING = (0.5, 1.0)  # of what lasts, which are tried with each time co
 _HINTED_TAU = (0.5, 2.0, 8.0)
 # [nat] from which a second colour is believed: it has four parameters; noise at rest and errors that last, too
 _WORTH = 4.0
+_BRIEF = 1.0  # [s] for which quick noise lasts at most
 _PARTS = 6  # of a drive, between which a heading that wanders differs
 _SLOWEST = 40.0  # [s] time constant of a heading that wanders: a slower one hardly differs
 _ALIKE = 0.08  # share by which a parameter may differ and be the same; about what a few minutes tell
