@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import interp1d
 
-from kurumaisu import effects
-from kurumaisu.effects import Context, Motion
+from kurumaisu import effects, geometry
+from kurumaisu.effects import Context, Motion, Reference
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 from kurumaisu.sim.chair.simulator import ChairSimulator, Command
@@ -52,6 +52,32 @@ def test_a_curve_multiplies_its_rate():
     np.testing.assert_allclose(moved.v, v + v * over_w, atol=1e-15)
     np.testing.assert_array_equal(moved.w, w)
     np.testing.assert_allclose(apply("smooth.w_gain.v", HATS, Motion(DT, v, w)).w, w + w * over_v, atol=1e-15)
+
+
+@pytest.mark.parametrize("turned", [0.0, 1.2])
+def test_a_curve_bends_what_a_reference_measures_along_the_axes_of_the_map(turned):
+    """However the frame of the poses is turned in the map."""
+    rng = np.random.default_rng(3)
+    poses = np.column_stack([rng.uniform(-0.3, 0.4, (6, 2)), rng.uniform(-3, 3, 6)])
+    frame = np.array([0.0, 0.0, -turned])
+    known = dict(zip(("x", "y", "heading"), poses.T, strict=True))
+    truth = Reference(np.arange(6.0), geometry.compose(frame, poses), np.zeros((6, 3)), known=known)
+    over_y = np.interp(poses[:, 1], [-0.3, 0.1, 0.4], [0.05, -0.02, 0.03])
+    for i, part in enumerate(("x", "y", "heading")):
+        seen = effects.by_id(f"smooth.reference_{part}.y")(HATS, CONTEXT).apply(truth)
+        expected = poses + over_y[:, None] * np.eye(3)[i]
+        np.testing.assert_allclose(geometry.between(frame, seen.poses), geometry.between(np.zeros(3), expected))
+
+
+def test_where_nobody_knows_where_a_chair_is_a_reference_is_bent_where_its_poses_are():
+    pose, rates = np.array([2.0, 0.1, 0.5]), np.array([0.4, 0.0, 0.1])
+    for part, over, by in (("x", "y", -0.02), ("heading", "v", 0.03), ("y", "w", -0.02)):
+        seen = effects.by_id(f"smooth.reference_{part}.{over}")(HATS, CONTEXT).apply(
+            Reference(np.array(1.0), pose, rates)
+        )
+        moved = pose + by * np.array([part == "x", part == "y", part == "heading"])
+        np.testing.assert_allclose(seen.poses, moved, atol=1e-12)
+        np.testing.assert_array_equal(seen.rates, rates)
 
 
 def test_beyond_its_knots_a_curve_is_constant():

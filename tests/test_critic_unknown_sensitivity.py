@@ -8,9 +8,12 @@ from scipy.sparse import csr_array
 from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import prepare, split
+from kurumaisu.critic.base.covariates import with_covariates
+from kurumaisu.critic.base.drive import edges_of, prepare, split
+from kurumaisu.critic.base.reference_sensitivity import reference_increments
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.unknown import periods
+from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.effects import smooth_id
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -21,6 +24,14 @@ MODEL = load_model(shipped("launch/md100.yaml"))
 def drive():
     drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=20.0, rate=50.0)
     return prepare(recordings.recording("columns", drives, []).runs[0], MODEL)
+
+
+@pytest.fixture(scope="module")
+def placed():
+    """Return the drive with where it was: that is where a reference is bent."""
+    drives = recordings.draw_drives("rich", USUAL, np.random.default_rng(4), seconds=20.0, rate=50.0)
+    run = recordings.recording("columns", drives, []).runs[0]
+    return with_covariates(prepare(run, MODEL), run)
 
 
 def seen_within_a_cell(drive):
@@ -49,6 +60,26 @@ def test_columns_are_what_a_little_of_the_curve_changes(drive, channel, cut):
     wanted = (moved(1) - moved(-1)) / (2 * small)
     assert np.abs(wanted).max() > 1e-3
     np.testing.assert_allclose(Sensitivity(seen, motion).increments(channel, rates)[:, 0], wanted, atol=5e-6)
+
+
+@pytest.mark.parametrize("channel", ["reference_x", "reference_y", "reference_heading"])
+@pytest.mark.parametrize("covariate", ["x", "y", "w"])
+@pytest.mark.parametrize("cut", ["whole", "part", "within a cell"])
+def test_columns_of_a_reference_are_what_a_little_of_its_curve_changes(placed, channel, covariate, cut):
+    seen = {"whole": placed, "part": split(placed, 3)[1], "within a cell": seen_within_a_cell(placed)}[cut]
+    motion = replay.motion(seen, MODEL, ())
+    basis = Basis(covariate, np.array([-1.0, 0.0, 0.4, 1.5]), {}, (), 0.0, 1.0)
+    small = 1e-5 * np.array([0.7, -0.4, 1.0, 0.2])
+
+    def moved(sign):
+        setting = EffectSetting(smooth_id(channel, covariate), basis.parameters(sign * small))
+        return replay.increments(seen, MODEL, [setting]).ravel()
+
+    wanted = (moved(1) - moved(-1)) / 2
+    assert np.abs(wanted).max() > 1e-8
+    errors = basis.matrix(edges_of(basis.samples(motion)))
+    found = reference_increments(seen, motion, channel, errors) @ small
+    np.testing.assert_allclose(found, wanted, atol=5e-4 * np.abs(wanted).max())
 
 
 @pytest.mark.parametrize("channel", ["v", "w"])

@@ -65,7 +65,17 @@ from kurumaisu.effects.reverse_gain import ReverseGain
 from kurumaisu.effects.saturation import Saturation
 from kurumaisu.effects.sign import Sign
 from kurumaisu.effects.slope import Slope
-from kurumaisu.effects.smooth import CHANNELS, SMOOTH, constant_of, curve, factor, smooth_id, smooth_of
+from kurumaisu.effects.smooth import (
+    CHANNELS,
+    REFERENCE_CHANNELS,
+    SMOOTH,
+    SmoothReference,
+    constant_of,
+    curve,
+    factor,
+    smooth_id,
+    smooth_of,
+)
 from kurumaisu.effects.smooth_covariates import (
     CONSTANTS,
     COVARIATES,
@@ -255,6 +265,7 @@ __all__ = [
     "PERIODIC",
     "RANGE_COVARIATES",
     "RECORDING_TIME",
+    "REFERENCE_CHANNELS",
     "RESTS",
     "SMOOTH",
     "WORLD",
@@ -278,6 +289,7 @@ __all__ = [
     "ReadingEffect",
     "Reference",
     "ReferenceEffect",
+    "SmoothReference",
     "Stage",
     "VoltageEffect",
     "Volts",

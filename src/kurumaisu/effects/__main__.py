@@ -80,6 +80,9 @@ since the laser was switched on, or `hit_x`, `hit_y` [m] in the map; besides, wh
 chair's rates `v`, `w`, and columns of `covariate.csv`, which the simulator does not know. `smooth.scatter.COVARIATE`
 multiplies the noise by exp(curve), with the stage SPREAD.
 
+`smooth.reference_x.COVARIATE`, `reference_y` [m] and `reference_heading` [rad] add a curve to the pose in the map that
+a reference measures, with the stage REFERENCE, and leave its rates. They follow `x`, `y`, `heading`, `v` or `w`.
+
 ```yaml
 effects:
   - {id: smooth.range.range, parameters: {knot_0: 1.9, knot_1: 2.1, value_0: 0.0, value_1: 0.01}}

@@ -90,13 +90,15 @@ class Motion:
 class Reference:
     """What a reference measures: times (...) [s], poses (..., 3) in the map, rates (..., 3) forward, leftward, yaw.
 
-    start: when the drive began [s], if its times go on from those of the drives before it.
+    start: when the drive began [s], if its times go on from those of the drives before it. known: what somebody knows
+    of each time, (...) each, as Motion has it, where poses and rates are not as those of the chair.
     """
 
     times: FloatArray
     poses: FloatArray
     rates: FloatArray
     start: float = 0.0
+    known: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

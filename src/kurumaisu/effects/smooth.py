@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""smooth.CHANNEL.COVARIATE: a rate departs from the model by a curve over something that it follows.
+"""smooth.CHANNEL.COVARIATE: a rate, or what a reference measures, departs by a curve over something that it follows.
 
 What the critic puts into the model for an effect that is not in the catalogue. The mechanism stays unknown.
 """
@@ -14,9 +14,10 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from kurumaisu.effects.base import Context, Effect, Follows, Motion, Rate, Stage
+from kurumaisu.effects.base import BaseEffect, Context, Effect, Follows, Motion, Rate, Reference, ReferenceEffect, Stage
 from kurumaisu.effects.smooth_covariates import CONSTANTS, COVARIATES, PERIODIC, Follower
 from kurumaisu.errors import Error
+from kurumaisu.geometry import compose, cos_sin
 from kurumaisu.types import FloatArray
 
 SMOOTH = "smooth"  # stands for every curve where effects are chosen by id
@@ -48,41 +49,30 @@ CHANNELS: Mapping[str, RateChannel] = {
     "curvature": RateChannel("rad/m", "w", "v"),
     "speed": RateChannel("m/s", "v", "direction"),
 }
-_ID = re.compile(rf"smooth\.({'|'.join(CHANNELS)})\.([A-Za-z][\w.]*)")
+# What a reference measures of the pose, in the map, by its index there; unit of the curve.
+REFERENCE_CHANNELS: Mapping[str, tuple[int, str]] = {
+    "reference_x": (0, "m"),
+    "reference_y": (1, "m"),
+    "reference_heading": (2, "rad"),
+}
+_ID = re.compile(rf"smooth\.({'|'.join([*CHANNELS, *REFERENCE_CHANNELS])})\.([A-Za-z][\w.]*)")
 _MOST = 64  # knots
 
 
-class Smooth(Effect):
-    """A curve over a covariate, added to one rate of a moving chair; made by smooth_of.
+class _Curve(BaseEffect):
+    """A curve over a covariate.
 
-    The curve is straight between knots and constant beyond the outer ones; over a periodic covariate it is a sum of
-    a level, sines and cosines.
+    It is straight between knots and constant beyond the outer ones; over a periodic covariate it is a sum of a level,
+    sines and cosines.
     """
 
-    stage = Stage.FLOOR
     parameters = ()
-    sentence = "an unknown effect changes a rate by a curve over another quantity"
-    formula = "rate + curve(covariate) while moving"
     source = "the critic, from a recording"
     shows_in = Rate.V
     follows = Follows.V
 
     channel: ClassVar[str]
     covariate: ClassVar[str]
-
-    def __init__(self, values: Mapping[str, float], context: Context) -> None:
-        self._follower = Follower(self.covariate, 0.0)
-        super().__init__(values, context)
-
-    def change(self, values: Mapping[str, float]) -> None:
-        """Go on with another curve, from what the covariate has come to."""
-        super().change(values)
-        constant = constant_of(self.covariate)
-        self._follower.constant = values[constant] if constant else 0.0
-
-    def settle(self, motion: Motion) -> None:
-        """Have been asked for the same, in the same direction."""
-        self._follower.settle(motion)
 
     @classmethod
     def check(cls, values: Mapping[str, float]) -> None:
@@ -105,6 +95,33 @@ class Smooth(Effect):
         if not start and (np.diff(numbered(values, "knot", 0)) <= 0).any():
             raise Error(f"{cls.id}: knots must increase: {numbered(values, 'knot', 0)}")
 
+    @property
+    def constant(self) -> float:
+        """Return the parameter that the covariate needs beside the curve, 0 where it needs none."""
+        name = constant_of(self.covariate)
+        return self.values[name] if name else 0.0
+
+
+class Smooth(_Curve, Effect):
+    """A curve added to one rate of a moving chair; made by smooth_of."""
+
+    stage = Stage.FLOOR
+    sentence = "an unknown effect changes a rate by a curve over another quantity"
+    formula = "rate + curve(covariate) while moving"
+
+    def __init__(self, values: Mapping[str, float], context: Context) -> None:
+        self._follower = Follower(self.covariate, 0.0)
+        super().__init__(values, context)
+
+    def change(self, values: Mapping[str, float]) -> None:
+        """Go on with another curve, from what the covariate has come to."""
+        super().change(values)
+        self._follower.constant = self.constant
+
+    def settle(self, motion: Motion) -> None:
+        """Have been asked for the same, in the same direction."""
+        self._follower.settle(motion)
+
     def apply(self, motion: Motion) -> Motion:
         """Add the curve, times a rate or not, to the channel's rate where the chair moves."""
         channel = CHANNELS[self.channel]
@@ -116,24 +133,46 @@ class Smooth(Effect):
         return replace(motion, **moved)
 
 
+class SmoothReference(_Curve, ReferenceEffect):
+    """A curve added to one part of the pose that a reference measures; made by smooth_of. Its rates stay."""
+
+    sentence = "an unknown effect changes what the reference measures by a curve over another quantity"
+    formula = "pose in the map + curve(covariate)"
+
+    def apply(self, reference: Reference) -> Reference:
+        """Add the curve to x, y or heading in the map."""
+        poses, rates, known = reference.poses, reference.rates, reference.known
+        own = {"x": poses[..., 0], "y": poses[..., 1], "heading": poses[..., 2], "v": rates[..., 0], "w": rates[..., 2]}
+        at = known.get(self.covariate, own.get(self.covariate))
+        added = curve(self.covariate, self.values, np.asarray(self.constant if at is None else at, dtype=float))
+        # The heading in the map is what is known of it: poses may be in a frame of their own.
+        cos, sin = cos_sin(np.asarray(known.get("heading", own["heading"])))
+        none = np.zeros_like(cos)
+        axis, _ = REFERENCE_CHANNELS[self.channel]
+        along = ((cos, -sin, none), (sin, cos, none), (none, none, none + 1))[axis]
+        shift = np.asarray(added)[..., np.newaxis] * np.stack(along, axis=-1)
+        return replace(reference, poses=compose(poses, shift))
+
+
 def factor(channel: RateChannel, motion: Motion) -> FloatArray:
     """Return by what a curve is multiplied before it is added to a channel's rate, (n,)."""
     return _BY[channel.by](motion)
 
 
 @cache
-def smooth_of(name: str) -> type[Smooth] | None:
+def smooth_of(name: str) -> type[BaseEffect] | None:
     """Return the effect of an id smooth.CHANNEL.COVARIATE, None for another one."""
     match = _ID.fullmatch(name)
     if match is None:
         return None
     channel, covariate = match.groups()
     text = f"an unknown effect changes {channel} with {covariate}"
-    return type("Smooth", (Smooth,), {"id": name, "channel": channel, "covariate": covariate, "sentence": text})
+    kind = SmoothReference if channel in REFERENCE_CHANNELS else Smooth
+    return type(kind.__name__, (kind,), {"id": name, "channel": channel, "covariate": covariate, "sentence": text})
 
 
 def smooth_id(channel: str, covariate: str) -> str:
-    """Return the id of the effect on a channel (v, lateral, w) that follows a covariate."""
+    """Return the id of the effect on a channel that follows a covariate."""
     return f"smooth.{channel}.{covariate}"
 
 

@@ -7,19 +7,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from kurumaisu import _core, geometry
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.types import FloatArray
+
+_SMOOTH = 1.0  # [s] before and after a row
 
 
 def with_covariates(drive: Drive, run: Run) -> Drive:
     """Return the drive with what its run knows on the grid.
 
-    Poses are the reference's, not the simulated ones: those drift away from where the chair was. Voltages are held,
-    further quantities are taken to change evenly between their samples.
+    Poses are the reference's, not the simulated ones: those drift away from where the chair was. But what the reference
+    errs from row to row must not pass for where the chair was: an error would follow itself. Voltages are held, further
+    quantities are taken to change evenly between their samples.
     """
-    middle = _middle(drive)
-    places = {name: np.interp(middle, drive.times, drive.poses[:, i]) for i, name in enumerate(("x", "y", "heading"))}
+    middle, poses = _middle(drive), _smoothed(drive)
+    places = {name: np.interp(middle, drive.times, poses[:, i]) for i, name in enumerate(("x", "y", "heading"))}
     return replace(drive, known={**with_covariates_but_place(drive, run).known, **places})
 
 
@@ -30,6 +34,21 @@ def with_covariates_but_place(drive: Drive, run: Run) -> Drive:
     if run.voltage is not None:
         known |= {name: _held(run.voltage, name, middle) for name in ("v_f", "v_s")}
     return replace(drive, known={**drive.known, **known})
+
+
+def _smoothed(drive: Drive) -> FloatArray:
+    """Return the reference's poses (m + 1, 3), what they are off the way that was asked for being its local mean."""
+    edges = drive.start + GRID * np.arange(len(drive.v) + 1)
+    path = _core.integrate(drive.v, drive.w, np.full(len(drive.v), GRID), [0.0, 0.0, 0.0])
+    asked = geometry.interpolate(edges, path, drive.times)
+    steps = geometry.between(asked[:-1], asked[1:])
+    ahead = drive.poses[:-1] * np.array([0.0, 0.0, 1.0])
+    steps[:, :2] = geometry.compose(ahead, steps)[:, :2]
+    way = np.cumsum(np.vstack([drive.poses[:1], steps]), axis=0)
+    rows = np.arange(len(way))
+    half = np.minimum(round(_SMOOTH / float(np.median(np.diff(drive.times)))), np.minimum(rows, len(way) - 1 - rows))
+    sums = np.vstack([np.zeros(3), np.cumsum(drive.poses - way, axis=0)])
+    return np.asarray(way + (sums[rows + half + 1] - sums[rows - half]) / (2 * half + 1)[:, np.newaxis])
 
 
 def _middle(drive: Drive) -> FloatArray:

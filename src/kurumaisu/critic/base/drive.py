@@ -179,6 +179,12 @@ def prepare_all(run: Run, model: Model, until: float) -> Drive:
     return Drive(run.name, source, float(edges[0]), v, w, pose.t[use], pose.values[use, :3], known=known)
 
 
+def edges_of(values: FloatArray) -> FloatArray:
+    """Return values of the steps of a grid, (n, ...), at their edges, (n + 1, ...): half way between two steps."""
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    return np.asarray(0.5 * (padded[1:] + padded[:-1]))
+
+
 def split(drive: Drive, parts: int) -> list[Drive]:
     """Return the drive cut into parts of equally many increments; each keeps all inputs, so effects keep their past."""
     return _cut(drive, np.linspace(0, len(drive.times) - 1, parts + 1).astype(int))

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import effects, geometry
-from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.base.drive import GRID, Drive, edges_of
 from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.errors import Error
 from kurumaisu.params import FOLLOWER, EffectSetting, Model, driven_as, load_model, shipped_robot
@@ -137,8 +137,16 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     started = drive.known.get(effects.RECORDING_TIME)
     start = 0.0 if started is None else float(started[0])
     times = start + GRID * np.arange(len(poses))
-    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start))
+    curved = any(isinstance(effect, effects.SmoothReference) for effect in chair.effects.reference)
+    known = _at_edges(motion) if curved else {}
+    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
     return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
+
+
+def _at_edges(motion: effects.Motion) -> dict[str, FloatArray]:
+    """Return what is known of a motion's steps (n,), and its rates, at their edges, (n + 1,) each."""
+    own = {**motion.known, "v": motion.v, "w": motion.w}
+    return {name: edges_of(values) for name, values in own.items()}
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:

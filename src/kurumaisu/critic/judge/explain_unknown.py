@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu import effects
+from kurumaisu import effects, geometry
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
@@ -41,7 +41,15 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _LISTED = 3  # curves that may act, at most
 _UNHELD = 0.5  # probability at most of a curve that did not hold
-_SEEN_IN = {"v": "dx", "lateral": "dy", "w": "dtheta"}  # channels of a gain
+_SEEN_IN = {  # channels of a gain, by the rate or the part of the measured pose
+    "v": ("dx",),
+    "lateral": ("dy",),
+    "w": ("dtheta",),
+    "reference_x": ("dx", "dy"),
+    "reference_y": ("dx", "dy"),
+    "reference_heading": ("dtheta",),
+}
+_SETTLED = 2.0  # [s] about a pose over which errors of the way level out in a picture
 _PLAUSIBLE = 0.02  # posterior from which another curve is listed
 
 
@@ -107,9 +115,10 @@ def _shares(made: Decision) -> tuple[float, float]:
 
 def _confirmed(made: Decision, gain: Gain | None) -> bool:
     assert made.extension is not None
-    rate = effects.CHANNELS[made.extension.curve.channel].rate
+    channel = made.extension.curve.channel
+    seen = _SEEN_IN[channel if channel in effects.REFERENCE_CHANNELS else effects.CHANNELS[channel].rate]
     nats = made.lead
-    return confirmed(gain, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(gain, (_SEEN_IN[rate],)))
+    return confirmed(gain, nats, free=True) or (nats >= STRONG_CURVE and simulates_nearer(gain, seen))
 
 
 def _no_noise(made: Decision) -> bool:
@@ -151,6 +160,8 @@ def _samples(
 
     That are those in which the chair moves on.
     """
+    if extension.curve.channel in effects.REFERENCE_CHANNELS:
+        return _measured_samples(problem, drive, extension)
     into = effects.CHANNELS[extension.curve.channel]
     channel = ("v", "lateral", "w").index(into.rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
@@ -170,6 +181,31 @@ def _samples(
         use &= np.abs(rates) > 0.3 * np.abs(rates).max()
         residual, left = (each / np.where(use, rates, 1.0) for each in (residual, left))
     return x, residual, left, use
+
+
+def _measured_samples(
+    problem: Problem, drive: Drive, extension: FitWithCurve
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return the same of an error of the reference, per increment's end: what is left, and the curve with that.
+
+    Nobody knows where the chair was but by the way it took, so what is left is told from its mean of some seconds.
+    """
+    curve = extension.curve
+    motion = replay.motion(drive, problem.model, extension.fit.settings)
+    cells = np.minimum(((drive.times[1:] - drive.start) / GRID).astype(int), len(motion.v) - 1)
+    x = curve.basis.samples(motion)[cells]
+    off = drive.measured - problem.simulated(drive, extension.settings)
+    axis, _ = effects.REFERENCE_CHANNELS[curve.channel]
+    ahead = drive.poses[:-1] * np.array([0.0, 0.0, 1.0])
+    path = np.cumsum(off[:, 2] if axis == 2 else geometry.compose(ahead, off)[:, axis])
+    first = np.searchsorted(drive.times[1:], drive.times[1:] - _SETTLED)
+    last = np.searchsorted(drive.times[1:], drive.times[1:] + _SETTLED, side="right")
+    sums = np.append(0.0, np.cumsum(path))
+    left = path - (sums[last] - sums[first]) / (last - first)
+    drawn = curve.basis.matrix(x) @ extension.coefficients
+    if "period" in curve.basis.constants:
+        x = np.mod(x, curve.basis.constants["period"])
+    return x, drawn + left, left, np.isfinite(x)
 
 
 def _sentences(extension: FitWithCurve, lead: float, share: float) -> str:

@@ -13,7 +13,7 @@ from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import ChannelGain, Kind, Verdict
+from kurumaisu.critic.values.verdict import ChannelGain, Kind, Unknown, Verdict
 
 _NOTHING_SAID = "none"
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
@@ -50,7 +50,7 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
         verdict=kind,
         causes=(*verdict.causes, *finding.causes),
         confounded=(*verdict.confounded, *finding.confounded),
-        unknown=(*verdict.unknown, *finding.unknown),
+        unknown=(*verdict.unknown, *(one for one in finding.unknown if not _told(one, verdict))),
     )
     words = headline(finding)
     if words and verdict.verdict in ("named", "confounded", "unknown"):
@@ -70,6 +70,11 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
         noise=(*story.noise, *shown.noise),
     )
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
+
+
+def _told(one: Unknown, verdict: Verdict) -> bool:
+    """Tell whether the drives tell of an error of the reference over the same."""
+    return any((one.channel, one.covariate) == (other.channel, other.covariate) for other in verdict.unknown)
 
 
 def confirmed_scans(

@@ -16,7 +16,8 @@ from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import Drive
+from kurumaisu.critic.base.drive import Drive, edges_of
+from kurumaisu.critic.base.reference_sensitivity import reference_increments
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
@@ -60,6 +61,15 @@ _BRAKES = {
     ),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
     "speed": ("time", "heading", "x", "y"),
+}
+
+
+# What the errors of a reference may follow: of the place above all, as markers go out of sight and maps are bent. What
+# it does over the time is the noise's, which may be slow.
+_SEEN_OVER = {
+    "reference_x": ("x", "y", "heading"),
+    "reference_y": ("x", "y", "heading"),
+    "reference_heading": ("x", "y", "heading", "v", "w"),
 }
 
 
@@ -108,8 +118,12 @@ class Design:
 
 def _channels(covariate: str) -> Iterator[str]:
     """Yield the channels in which a curve over a covariate is tried; what was measured beside may act on all."""
+    extra = covariate not in effects.COVARIATES
     for channel in effects.CHANNELS:
-        if covariate not in effects.COVARIATES or covariate in _BRAKES.get(channel, (covariate,)):
+        if extra or covariate in _BRAKES.get(channel, (covariate,)):
+            yield channel
+    for channel, followed in _SEEN_OVER.items():
+        if covariate in followed:
             yield channel
 
 
@@ -132,7 +146,11 @@ def raw_columns(drive: Drive, model: Model, settings: Sequence[EffectSetting], c
     matrices = {id(basis): basis.matrix(basis.samples(motion)) for basis in (curve.basis for curve in curves)}
     out = np.empty((3 * (len(drive.times) - 1), sum(curve.basis.size for curve in curves)))
     for curve, end in zip(curves, np.cumsum([curve.basis.size for curve in curves]), strict=True):
-        own = sensitivity.increments(curve.channel, matrices[id(curve.basis)])
+        if curve.channel in effects.REFERENCE_CHANNELS:
+            errors = curve.basis.matrix(edges_of(curve.basis.samples(motion)))
+            own = reference_increments(drive, motion, curve.channel, errors)
+        else:
+            own = sensitivity.increments(curve.channel, matrices[id(curve.basis)])
         out[:, end - curve.basis.size : end] = own
     return out
 

@@ -19,6 +19,9 @@ CHANNEL_NAMES = {
     "w_gain": "yaw rate",
     "curvature": "curvature of the path",
     "speed": "absolute forward speed",
+    "reference_x": "reference's x",
+    "reference_y": "reference's y",
+    "reference_heading": "reference's heading",
 }
 _SHARES = {"v_gain": "of the forward speed", "w_gain": "of the yaw rate"}  # in place of a unit
 COVARIATES = {
@@ -52,7 +55,8 @@ def covariate(curve: Curve) -> tuple[str, str, str]:
 
 def channel(curve: Curve) -> str:
     """Return the channel as the verdict has it."""
-    return f"base.{effects.CHANNELS[curve.channel].rate}"
+    of_reference = curve.channel in effects.REFERENCE_CHANNELS
+    return curve.channel.replace("_", ".") if of_reference else f"base.{effects.CHANNELS[curve.channel].rate}"
 
 
 def followed(curve: Curve) -> str:
@@ -62,6 +66,8 @@ def followed(curve: Curve) -> str:
 
 def unit_of(channel: str) -> str:
     """Return the unit of a channel's curves; in words where it is a share."""
+    if channel in effects.REFERENCE_CHANNELS:
+        return effects.REFERENCE_CHANNELS[channel][1]
     return _SHARES.get(channel, effects.CHANNELS[channel].unit)
 
 
