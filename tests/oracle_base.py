@@ -290,7 +290,7 @@ def caster_reversal(p, drive):
 def dac_zero_f(p, v_f, v_s, _signs):
     """Nobody drives a chair that creeps at rest: its brakes hold it; with rests = -1 it has none, and no dead zone."""
     side = _LAWS["translation"]["positive" if p["offset"] > 0 else "negative"]
-    at_rest = side["intercept"] + p["offset"] if p.get("rests", 0.0) < 0 and p["offset"] else 0.0
+    at_rest = side["intercept"] + p["offset"] if round(p.get("rests", 0.0)) < 0 and p["offset"] else 0.0
     return [v + p["offset"] if v else at_rest for v in v_f], v_s
 
 
@@ -328,7 +328,7 @@ def dac_quantisation(p, v_f, v_s, signs):
     if p["step"] == 0:
         return v_f, v_s
     v_f, v_s = ([math.copysign(reached(abs(v)), v) if v else 0.0 for v in volts] for volts in (v_f, v_s))
-    if p["rests"] < 0:  # nobody turns to the other side than was meant
+    if round(p["rests"]) < 0:  # nobody turns to the other side than was meant
         sides = {1: _LAWS["steering"]["positive"], -1: _LAWS["steering"]["negative"]}
         other = [
             sign in sides and (v - sides[sign]["intercept"]) / sides[sign]["slope"] * sign < 0

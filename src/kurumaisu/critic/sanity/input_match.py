@@ -218,10 +218,12 @@ def unrelated(match: Match, number: float, name: str) -> list[str]:
     number: of independent samples.
     """
     known = np.isfinite(match.factor)
-    small = (np.abs(match.correlation[known]) < _UNLIKE) & (np.abs(match.factor[known]) < _UNLIKE)
-    if match.words or number < _ENOUGH or not known.any() or not small.all():
+    alike, factor = (np.abs(values[known]) for values in (match.correlation, match.factor))
+    moves = bool((factor > _UNLIKE * alike).any())  # as much as was asked for: one that stands is held, or has no power
+    unlike = bool(((alike < _UNLIKE) & (factor < _UNLIKE)).all())
+    if match.words or number < _ENOUGH or not moves or not unlike:
         return []
-    best = float(np.abs(match.correlation[known]).max())
+    best = float(alike.max())
     return [
         f"the motion has nothing to do with its {name} (correlation of the rates: {best:.2f} at most): are the poses "
         f"those of another drive?"
