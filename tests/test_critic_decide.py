@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What is decided: a curve only where it is likelier than the catalogue in any form, each heard with its own noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import unknown_effects as hidden
 
+from kurumaisu.bench.hidden.base import recordings
+from kurumaisu.bench.hidden.generator.motion import Fault, Form
+from kurumaisu.bench.hidden.generator.noise import USUAL
+from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.judge import decide
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.noise.base_noise import START, NoiseGrowth
 from kurumaisu.critic.search.posterior import SearchResult
+from kurumaisu.params import load_model, shipped
 
+MODEL = load_model(shipped("launch/md100.yaml"))
 TRUTH = hidden.USUAL.position_sd, hidden.USUAL.heading_sd
 
 
@@ -100,3 +108,27 @@ def test_slow_noise_takes_up_no_curve():
     assert made.extension is not None
     assert made.extension.curve.id == "smooth.w.heading"
     assert made.problem.noise.slow_w < 0.02
+
+
+def test_slow_noise_takes_up_no_offset():
+    """A chair that creeps, at rest as well, drifts as by noise that lasts, which is believed only without a cause."""
+    creeping = Fault(Form("floor", lambda r, _: replace(r, v=r.v + 0.007)), {})
+    drawn = recordings.draw_drives("rich", USUAL, np.random.default_rng(6), seconds=40.0, rate=10.0)
+    runs = recordings.recording("creeps", drawn, [creeping]).runs
+    ids = frozenset({"base.dac_zero_f", "base.gain_v", "base.gain_w"})
+    problem = Problem([prepare(run, MODEL) for run in runs], MODEL, START, ids=ids)
+    made = decide.decide(problem, None, lambda _: None)
+    assert made.found.best.ids == {"base.dac_zero_f"}
+    (setting,) = made.found.best.settings
+    assert setting.parameters["rests"] == -1.0
+    assert setting.parameters["offset"] / MODEL.translation.positive.slope == pytest.approx(0.007, rel=0.3)
+    assert made.problem.noise.slow_v < 0.005
+
+
+def test_quick_noise_is_as_loud_within_a_second_and_lasts_no_longer():
+    noise = replace(START, sd_w=0.02, tau=16.0, slow_v=0.01, slow_tau=0.5, lasting=0.7)
+    quick = noise.quick
+    assert (quick.tau, quick.slow_tau, quick.lasting) == (1.0, 0.5, 0.0)
+    assert quick.sd_w**2 / quick.tau == pytest.approx(noise.sd_w**2 / noise.tau)  # how fast it begins to change
+    assert quick.slow_v == noise.slow_v
+    assert (noise.slowest, quick.slowest, replace(noise, slow_v=0.0, tau=0.2).slowest) == (16.0, 1.0, 0.2)

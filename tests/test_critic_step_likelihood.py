@@ -60,7 +60,7 @@ def test_without_steps_no_peak_is_worth_its_cost():
     problem = problem_with("plain", 0.0, 2)
     nothing = problem.fit_candidates((), {}).score
     fits = [problem.fit_candidates([candidate], {}) for candidate in problem.candidates]
-    assert len(fits) == 6  # rounded, without a 0, cut, resting at 0 V, and two that rest beyond a branch
+    assert len(fits) == 5  # rounded, without a 0, cut, resting at 0 V, resting beyond a branch
     assert all(fit.score < nothing for fit in fits)
 
 

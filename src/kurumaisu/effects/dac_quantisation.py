@@ -36,7 +36,6 @@ class DacQuantisation(VoltageEffect):
         {"phase": 0.5, "cut": 1.0, "rests": 0.0},
         {"phase": 0.0, "cut": 0.0, "rests": 1.0},
         {"phase": 0.0, "cut": 0.0, "rests": -1.0},
-        {"phase": 0.5, "cut": 1.0, "rests": -1.0},
     )
     sentence = "the voltages come in steps of the D/A converter"
     formula = (

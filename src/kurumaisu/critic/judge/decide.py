@@ -24,6 +24,8 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.types import FloatArray
 
 _HINT = -3.0  # [nat] from which all is judged with the noise about a curve, too
+_LASTS = 5.0  # [s] for which noise lasts that may be what acts throughout
+_LOOKS = 1  # rounds of that search: what it finds is judged by another one
 _LEAST = 3.0  # [nat] by which that must be likelier
 _ANEW = 2  # times that all is judged anew, because other effects act than those about which the noise was taken
 Truth = tuple[float, float] | None
@@ -141,9 +143,9 @@ def _noise_about(
 def _hinted(problem: Problem, found: SearchResult, progress: Progress) -> Hint | None:
     """Return what may well act were nothing slow in the noise: what lasts for long may be the one or the other."""
     easy = problem.changed(noise=problem.noise.quick)
-    if not base_noise.alike(easy.noise, problem.noise):
+    if problem.noise.slowest > _LASTS:
         progress("looking again, as if no noise were slow")
-        again = search.search(easy, progress, found.best)
+        again = search.search(easy, progress, found.best, _LOOKS)
         curve = likelier_curve(again)
         return Hint(again, curve) if curve is not None or again.best.ids != found.best.ids else None
     curves = CurveSearch(easy)

@@ -55,6 +55,11 @@ class Noise:
         return float(np.hypot(1.0, self.lasting))
 
     @property
+    def slowest(self) -> float:
+        """Return for how long noise of the rates lasts [s]."""
+        return max(self.tau, self.slow_tau) if self.slow_v else self.tau
+
+    @property
     def quick(self) -> Noise:
         """Return the noise without what lasts: within _BRIEF it is as loud."""
         first, second = (min(1.0, float(np.sqrt(_BRIEF / tau))) for tau in (self.tau, self.slow_tau))

@@ -34,9 +34,11 @@ _LARGEST = 6  # effects in a set
 _STEP_COST = 4.0  # [nat] of a size that may be any of many
 
 
-def search(problem: Problem, progress: Callable[[str], None], first: Fit | None = None) -> SearchResult:
-    """Return which effects act, and which curves may; first: a set to begin with."""
-    made = _Search(problem, progress)
+def search(
+    problem: Problem, progress: Callable[[str], None], first: Fit | None = None, rounds: int = _ROUNDS
+) -> SearchResult:
+    """Return which effects act, and which curves may; first: a set to begin with; rounds: at most."""
+    made = _Search(problem, progress, rounds)
     made.run(first)
     return posterior(problem, made.fits, made.curves)
 
@@ -44,8 +46,8 @@ def search(problem: Problem, progress: Callable[[str], None], first: Fit | None 
 class _Search:
     """The sets that were fitted, and what they propose."""
 
-    def __init__(self, problem: Problem, progress: Callable[[str], None]) -> None:
-        self.problem, self._progress = problem, progress
+    def __init__(self, problem: Problem, progress: Callable[[str], None], rounds: int) -> None:
+        self.problem, self._progress, self._rounds = problem, progress, rounds
         self.of = len({candidate.id for candidate in problem.candidates})
         self.fits: dict[EffectSet, Fit] = {}
         self.curves = CurveSearch(problem)
@@ -98,7 +100,7 @@ class _Search:
                     self.curves.closer(rest)
 
     def _go_on(self) -> None:
-        for _ in range(_ROUNDS):
+        for _ in range(self._rounds):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
             ahead = [
