@@ -41,9 +41,7 @@ def _smoothed(drive: Drive) -> FloatArray:
     edges = drive.start + GRID * np.arange(len(drive.v) + 1)
     path = _core.integrate(drive.v, drive.w, np.full(len(drive.v), GRID), [0.0, 0.0, 0.0])
     asked = geometry.interpolate(edges, path, drive.times)
-    steps = geometry.between(asked[:-1], asked[1:])
-    ahead = drive.poses[:-1] * np.array([0.0, 0.0, 1.0])
-    steps[:, :2] = geometry.compose(ahead, steps)[:, :2]
+    steps = drive.in_map(geometry.between(asked[:-1], asked[1:]))
     way = np.cumsum(np.vstack([drive.poses[:1], steps]), axis=0)
     rows = np.arange(len(way))
     half = np.minimum(round(_SMOOTH / float(np.median(np.diff(drive.times)))), np.minimum(rows, len(way) - 1 - rows))

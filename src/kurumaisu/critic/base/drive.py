@@ -76,6 +76,18 @@ class Drive:
         below = np.minimum(place.astype(int), len(self.v) - 1)
         return below, place - below
 
+    def at_poses(self, edges: FloatArray) -> FloatArray:
+        """Return values (n + 1, ...) at the edges of the grid at the reference's times, (m + 1, ...)."""
+        below, share = self.places
+        low, high = edges.take(below, axis=0), edges.take(below + 1, axis=0)
+        return np.asarray(low + (share if edges.ndim == 1 else share[:, None]) * (high - low))
+
+    def in_map(self, steps: FloatArray) -> FloatArray:
+        """Return steps (m, 3) that begin at each pose, along the axes of the map; turns stay."""
+        out = geometry.compose(self.poses[:-1] * np.array([0.0, 0.0, 1.0]), steps)
+        out[:, 2] = steps[:, 2]
+        return np.asarray(out)
+
     @cached_property
     def activity(self) -> FloatArray:
         """Share of each increment's noise that acts, (m,): floor and casters shake a chair that moves."""

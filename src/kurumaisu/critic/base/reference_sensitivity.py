@@ -16,17 +16,11 @@ def reference_increments(drive: Drive, motion: effects.Motion, channel: str, err
 
     (3 m, k).
     """
-    below, share = drive.places
-
-    def at_poses(edges: FloatArray) -> FloatArray:
-        left, right = edges[below], edges[below + 1]
-        return np.asarray(left + (right - left) * share.reshape(-1, *np.ones(edges.ndim - 1, dtype=int)))
-
-    poses = at_poses(plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0])))
+    poses = drive.at_poses(plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0])))
     known = motion.known.get("heading")
-    heading = poses[:, 2] if known is None else at_poses(edges_of(known))
+    heading = poses[:, 2] if known is None else drive.at_poses(edges_of(known))
     axis, _ = effects.REFERENCE_CHANNELS[channel]
-    size = at_poses(errors)
+    size = drive.at_poses(errors)
     steps = geometry.between(poses[:-1], poses[1:])
     out = np.zeros((len(steps), 3, errors.shape[1]))
     before, after = size[:-1], size[1:]

@@ -130,9 +130,7 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     chair, motion = _driven(drive, model, settings)
     poses = plant.path(motion, np.zeros(3))
     if not chair.effects.reference:
-        below, share = drive.places
-        low, high = poses.take(below, axis=0), poses.take(below + 1, axis=0)
-        return np.asarray(low + share[:, None] * (high - low))
+        return drive.at_poses(poses)
     # A clock that runs fast is right at the start, of the drive or of the first one.
     started = drive.known.get(effects.RECORDING_TIME)
     start = 0.0 if started is None else float(started[0])

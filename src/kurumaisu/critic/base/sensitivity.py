@@ -30,7 +30,7 @@ class Sensitivity:
         self._heading = 0.5 * (poses[:-1, 2] + poses[1:, 2])
         # Anything summed over the grid is taken at the reference's times, linear within a cell: the share of it before.
         below, share = drive.places
-        self._headings = poses[below, 2] + share * (poses[below + 1, 2] - poses[below, 2])
+        self._headings = drive.at_poses(poses[:, 2])
         counts = np.diff(below) + 1
         self._rows = np.append(0, np.cumsum(counts))  # where each increment's cells begin
         self._increment = np.repeat(np.arange(len(counts)), counts)

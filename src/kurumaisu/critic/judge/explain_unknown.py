@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu import effects, geometry
+from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
@@ -196,8 +196,7 @@ def _measured_samples(
     x = curve.basis.samples(motion)[cells]
     off = drive.measured - problem.simulated(drive, extension.settings)
     axis, _ = effects.REFERENCE_CHANNELS[curve.channel]
-    ahead = drive.poses[:-1] * np.array([0.0, 0.0, 1.0])
-    path = np.cumsum(off[:, 2] if axis == 2 else geometry.compose(ahead, off)[:, axis])
+    path = np.cumsum(drive.in_map(off)[:, axis])
     first = np.searchsorted(drive.times[1:], drive.times[1:] - _SETTLED)
     last = np.searchsorted(drive.times[1:], drive.times[1:] + _SETTLED, side="right")
     sums = np.append(0.0, np.cumsum(path))

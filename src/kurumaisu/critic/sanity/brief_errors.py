@@ -10,12 +10,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from kurumaisu import geometry
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import Drive, prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 _FAR = 8.0  # sds of what a model leaves between two rows
@@ -23,7 +23,8 @@ _LONGEST = 1.0  # [s]
 _BACK = 0.4  # share of the way out, of which the way back may differ
 _QUIET = 0.35  # the same, that another row near by may be off
 _NEAR = 2  # rows
-_SD = {1: 1.4826, 2: 0.8493}  # of a normal vector's components, by its number of them, over the median of its norm
+# Of a normal vector's components, by the number of them, over the median of its norm.
+_SD = {1: SIGMA_PER_MAD, 2: 0.8493}
 
 
 def brief_errors(run: Run, model: Model) -> BoolArray:
@@ -34,20 +35,13 @@ def brief_errors(run: Run, model: Model) -> BoolArray:
         drive = prepare(run, model, interval=1e-9)
     except Error:
         return off
-    left = _left(drive, model)
+    left = drive.in_map(drive.measured - replay.increments(drive, model, ()))
     rows = np.zeros(len(drive.times), dtype=np.bool_)
     for part in (left[:, :2], left[:, 2:]):
         for first, end in _excursions(part, drive.times):
             rows[first:end] = True
     off[np.searchsorted(run.pose.t, drive.times[rows])] = True
     return off
-
-
-def _left(drive: Drive, model: Model) -> FloatArray:
-    """Return what a model leaves of each increment, along the map's axes, (m, 3)."""
-    off = drive.measured - replay.increments(drive, model, ())
-    heading = drive.poses[:-1] * np.array([0.0, 0.0, 1.0])
-    return np.column_stack([geometry.compose(heading, off)[:, :2], off[:, 2]])
 
 
 def _excursions(left: FloatArray, times: FloatArray) -> list[tuple[int, int]]:
