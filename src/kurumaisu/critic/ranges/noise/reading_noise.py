@@ -65,18 +65,19 @@ def estimate_reading_noise(
 ) -> BeamNoise:
     """Return the noise of the readings once more; first: before any was known; beam: the last; grid: their step [m].
 
-    leftover: returns what is left of the residual (k, b) [m], with a noise that says which readings count.
+    leftover: returns what is left of the residual (k, b) [m], NaN where that says nothing, with a noise that says which
+    readings count.
     """
     every = leftover(beam)
     left = np.where(beam.valid, every, np.nan)
     sd = first.sd.copy()
     for covariate in (seen.ranges, seen.incidence):  # oblique walls may be read more noisily
-        sd *= _factors(left, sd, np.where(beam.valid, covariate, np.nan), covariate)
+        sd *= _factors(left, sd, np.where(np.isfinite(left), covariate, np.nan), covariate)
     z = left / sd
     # Of every reading that may ever count, outliers of the last round too.
     again = (left if np.array_equal(beam.valid, first.valid) else every) / sd
     valid = first.valid & (np.abs(np.nan_to_num(again)) < OUTLIER) & ~_jolted(again, first, layout)[:, np.newaxis]
-    inside = beam.valid & (np.abs(z) < OUTLIER)
+    inside = beam.valid & (np.abs(np.nan_to_num(z, nan=np.inf)) < OUTLIER)
     rho = neighbours_correlation(z, inside)
     kept = np.where(inside, left, np.nan)
     sd = sd * _repeated(grid, first.sd, sd, layout)
@@ -106,7 +107,7 @@ def _jolted(z: FloatArray, first: BeamNoise, layout: Layout) -> BoolArray:
     """Return (k,) which scans nothing fits as well as the others: the speed jumped between two poses."""
     with np.errstate(invalid="ignore"):
         seen = np.where(first.valid, np.minimum(np.abs(z), OUTLIER), np.nan)
-    some = first.valid.any(axis=1)
+    some = np.isfinite(seen).any(axis=1)
     size = np.ones(len(z))
     size[some] = np.sqrt(np.nanmean(seen[some] ** 2, axis=1))
     middle = float(np.median(size[some]))

@@ -59,6 +59,7 @@ from kurumaisu.types import BoolArray, FloatArray, IntArray
 _SURE = 0.3  # share of the scans that must lie on a smooth path, or else none is preferred
 _ROUNDS = 3
 _SHIFTS = 2  # times that poses are sought by the scans
+_KEPT = 0.1  # share of a reading's variance that a fit leaves, below which what is left says nothing of it
 _BROAD = ScanNoise(position_sd=0.02, heading_sd=0.01, common_sd=0.01, common_tau=1.0)  # before any is known
 
 
@@ -346,17 +347,24 @@ class Assembly:
         return [out.get(k, none) for k in range(len(self.hats))]
 
     def leftover(self, beam: BeamNoise, columns: IntArray) -> FloatArray:
-        """Return what some columns, the poses and the common modes leave of the residual (k, b) [m]."""
+        """Return what some columns, the poses and the common modes leave of the residual (k, b) [m].
+
+        As much as it would be had the scan not been fitted by its own readings: a fit of six errors of poses to eight
+        readings leaves little of their noise. NaN where next to nothing is left.
+        """
         grams = self.grams(beam, columns)
         total = marginal(grams, self.layout, _BROAD)[0]
         beta = _solve(total[:-1, :-1], total[:-1, -1])
         out: FloatArray = np.empty_like(self.residual)
         for k, gram in enumerate(grams):
             own, shared, common = self._rows(k, columns)
-            lead = gram.own + gram.shared
+            random, lead = np.hstack([own, shared]), gram.own + gram.shared
             target = gram.matrix[:lead, -1] - gram.matrix[:lead, lead:-1] @ beta
-            random = _solve(gram.matrix[:lead, :lead], target)
-            out[k] = common[:, -1] - common[:, :-1] @ beta - np.hstack([own, shared]) @ random
+            fitted = np.where(beam.valid[k][:, np.newaxis], random, 0.0)
+            solved = _solve(gram.matrix[:lead, :lead], np.column_stack([target, fitted.T]))
+            kept = 1 - np.einsum("bq,qb->b", fitted, solved[:, 1:]) / beam.sd[k] ** 2
+            kept = np.where(kept > _KEPT, kept, np.nan)
+            out[k] = (common[:, -1] - common[:, :-1] @ beta - random @ solved[:, 0]) / np.sqrt(kept)
         return out
 
     def _plain(self, fitted: Sequence[Form]) -> list[Form]:
@@ -403,4 +411,4 @@ class Assembly:
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:
     norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     inside = gram / np.outer(norms, norms) + 1e-9 * np.eye(len(gram))
-    return np.asarray(np.linalg.solve(inside, target / norms) / norms)
+    return np.asarray((np.linalg.solve(inside, (target.T / norms).T).T / norms).T)
