@@ -10,6 +10,7 @@ from laser_scene import recording, sparse
 from kurumaisu.critic.ranges.scans.beams import hits_of, predict
 from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -27,6 +28,16 @@ def test_a_coarse_fan_keeps_the_beams_that_a_fine_one_keeps(tmp_path, every):
     fine, coarse = usable(data)[0][:, ::every], usable(sparse(data, every))[0]
     assert fine.mean() > 0.4
     assert (fine[:, 1:-1] == coarse[:, 1:-1]).mean() > 0.95
+
+
+@pytest.mark.parametrize("every", [6, 21])
+def test_readings_of_a_coarse_fan_scatter_as_they_do(tmp_path, every):
+    """Six errors of poses are fitted to some ten readings of a scan, and leave little of their noise."""
+    made = Assembly(gather(sparse(recording(tmp_path, None, 0.0, 5, scans=120), every), MODEL))
+    noise = made.settle((0.003, 0.003)).beam_noise
+    share = (noise.sd / made.first.sd)[noise.valid]
+    assert 0.9 < np.median(share) < 1.1
+    assert share.min() > 0.7
 
 
 def test_a_thin_wall_seen_from_its_end_has_edges_though_every_beam_misses_it(tmp_path):

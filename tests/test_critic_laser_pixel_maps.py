@@ -53,7 +53,7 @@ def turned(data, folder, walls):
     return replace(data, world=path, runs=(replace(run, pose=Series(run.pose.t, poses, run.pose.columns)),))
 
 
-def of_pixels(data, folder, pixel):
+def of_pixels(data, folder, pixel, spread=1.0):
     """Return the same as a simulator has it whose rays end at the pixels."""
     true = drawn(data, folder, pixel)
     shots = gather(true, MODEL)
@@ -61,7 +61,7 @@ def of_pixels(data, folder, pixel):
     seen = hits_of(shots, (), 0)
     mean = predict(shots, (), seen, 0)
     rng = np.random.default_rng(5)
-    read = np.round(mean + deviations(shots, seen, mean) * rng.standard_normal(mean.shape), 3)
+    read = np.round(mean + spread * deviations(shots, seen, mean) * rng.standard_normal(mean.shape), 3)
     (run,) = true.runs
     rows = np.searchsorted(run.scan.t, shots.stamps - 1e-9)
     poses = run.pose.values + 0.003 * rng.standard_normal(run.pose.values.shape)
@@ -84,6 +84,18 @@ def test_walls_are_stairs_whose_readings_have_them(tmp_path, pixel, monkeypatch)
     assert len(gather(made, MODEL).walls.segments) > 400
     found = criticise_scans(made, MODEL, lambda _: None)
     assert "draw such walls as polygons" in found.refused
+
+
+@pytest.mark.parametrize(("effect", "named"), [(None, set()), ("laser.range_noise", {"laser.range_noise"})])
+def test_stairs_that_are_lost_in_the_noise_are_no_noise_of_the_laser(tmp_path, monkeypatch, effect, named):
+    """Walls are straight then, and readings are expected to scatter as much farther as the stairs make them."""
+    exact = sparse(recording(tmp_path, None, 0.0, 3, scans=60, truth=1e-6))
+    with monkeypatch.context() as patch:
+        patch.setattr("kurumaisu.critic.ranges.scans.gathering.with_likelier_walls", lambda shots: shots)
+        made = of_pixels(exact, tmp_path, 0.003, spread=1.0 if effect is None else 1.4)
+    found = criticise_scans(made, MODEL, lambda _: None)
+    assert found.refused is None
+    assert {cause.id for cause in found.causes} == named
 
 
 def test_a_wrong_mounting_is_found_in_a_map_of_coarse_pixels(tmp_path):

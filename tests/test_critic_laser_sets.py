@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.judge.clock_drift import without_double_delay
-from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.judge.reference_point import from_base_link, refuted
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search.confounding import confounded
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
@@ -97,6 +97,43 @@ def test_a_point_off_base_link_does_not_move_the_laser_too(mount, named):
     assert settings == (shift,), "to the reference, the laser sits there"
     assert any("laser.mount_x" in line and "base.marker_x" in line for line in seen.details)
     assert looked[0].runs[0].pose.values[:, :2] == pytest.approx(np.array([[0.95, 2.0], [1.0, 1.95]]))
+
+
+SET = ("base.cross_w_to_v", "base.marker_y")
+
+
+@pytest.mark.parametrize(
+    ("mount", "there", "out"),
+    [
+        (-0.020, None, ["base.cross_w_to_v"]),
+        (None, 0.020, ["base.marker_y"]),
+        (0.003, 0.023, []),
+        (None, None, []),
+    ],
+    ids=["scans see the point", "scans see base_link", "the laser is off, too", "scans see nothing"],
+)
+def test_scans_tell_which_point_the_reference_measures(mount, there, out):
+    """A point to the left of base_link and a chair that turns about another one look alike to the drives."""
+    point, looked = cause("base.marker_y", "y", 0.020, 0.001), []
+
+    def seen(size):
+        return LaserFinding() if size is None else LaserFinding(causes=(cause("laser.mount_y", "y", size, 0.0004),))
+
+    def look(recording):
+        looked.append(recording)
+        return seen(there)
+
+    pose = Series(np.array([0.0]), np.array([[1.0, 2.0, 0.0]]), ("x", "y", "theta"))
+    recording = Recording("drives", (Run("one", pose=pose),), ("one",))
+    told = refuted((point,), (SET,), seen(mount), recording, MODEL, look)
+    assert list(told) == out
+    if out != ["base.cross_w_to_v"]:
+        assert looked[0].runs[0].pose.values[0, :2] == pytest.approx([1.0, 1.98]), "from where base_link would be"
+
+
+def test_scans_that_say_nothing_refute_nothing():
+    point, finding = cause("base.marker_y", "y", 0.020, 0.001), LaserFinding(refused="there is no map")
+    assert refuted((point,), (SET,), finding, Recording("none", (), ()), MODEL, None) == {}
 
 
 def test_what_shifts_no_point_is_left_alone():

@@ -67,6 +67,17 @@ def test_a_reference_that_jumps_about_until_it_is_back_is_set_aside():
     assert "4 of its 1200 rows set aside" in told
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_what_the_chair_drives_meanwhile_does_not_keep_a_reference_away(seed):
+    """At 5 Hz it drives 0.4 m while the reference is elsewhere."""
+    run = phased(np.random.default_rng(seed), rate=5.0)
+    for row, by in ((130, [0.3, 0.0, 0.0]), (131, [0.5, 0.4, 0.0]), (132, [0.3, -0.4, 0.0]), (133, [0.5, 0.3, 0.0])):
+        run = moved(run, [row], np.array(by))
+    pose, (told,) = judged(run)
+    assert_without(pose, run, np.arange(130, 134))
+    assert "4 of its 300 rows set aside" in told
+
+
 @pytest.mark.parametrize("rows", [[500], [500, 501, 502]])
 @pytest.mark.parametrize("by", [[0.02, -0.02, 0.0], [0.0, 0.0, 0.15]])
 def test_rows_that_are_off_by_less_than_a_jump_are_set_aside(rows, by):

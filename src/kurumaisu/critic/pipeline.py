@@ -11,13 +11,13 @@ from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.elapsed import with_elapsed_time
 from kurumaisu.critic.data.long_runs import bounded
 from kurumaisu.critic.heldout import scan_gain
-from kurumaisu.critic.heldout.extension_gain import with_scan_gain, with_slam
+from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
-from kurumaisu.critic.judge.reference_point import from_base_link
+from kurumaisu.critic.judge.reference_point import PLACES, from_base_link, refuted
 from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
@@ -29,8 +29,10 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.selection import those
 from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
+from kurumaisu.params import Model
 from kurumaisu.whole_files import write_whole
 
 
@@ -65,6 +67,8 @@ def criticise(
         if base is not None and base.verdict.verdict == "invalid_data":
             return with_robot(base, recording)
         scans = scans_say(progress)
+        if base is not None and extension.points:
+            base, extension = _beside_scans(base, extension, scans, whole, model, progress, ids)
     found = base or explain.undriven(recording, model)
 
     def again(moved: Recording) -> LaserFinding:
@@ -91,6 +95,29 @@ def criticise(
     every = (*found.settings, *(each for each in settings if each not in found.settings))
     ranges = list(predictions.ranges(stamped, model, forecast, every))
     return replace(found, predictions=tuple(predictions.predictions(whole, extension.forecast, ranges)))
+
+
+def _beside_scans(
+    base: Criticism,
+    extension: Extension,
+    scans: LaserFinding,
+    recording: Recording,
+    model: Model,
+    progress: Progress,
+    ids: frozenset[str] | None,
+) -> tuple[Criticism, Extension]:
+    """Return what the drives say, without what the scans refute of their sets."""
+
+    def mounted(there: Recording) -> LaserFinding:
+        return criticise_scans(there, model, progress, PLACES)
+
+    told = refuted(extension.points, base.verdict.confounded, scans, recording, model, mounted)
+    if not told:
+        return base, extension
+    progress("judging the drives again, without what the scans refute")
+    base, extension = criticise_drives(recording, model, progress, those(ids) - told.keys())
+    words = (f"{name} does not act: {why}." for name, why in told.items())
+    return replace(base, story=replace(base.story, details=(*base.story.details, *words))), extension
 
 
 def write(criticism: Criticism, model_file: Path, folder: Path) -> None:

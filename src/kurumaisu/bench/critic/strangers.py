@@ -57,9 +57,9 @@ class Case:
 
     @property
     def named(self) -> set[str]:
-        """Return the causes that were named, but for what is always neutral."""
+        """Return the causes that were named, but for what is neutral where it is not hidden."""
         causes = self.verdict.causes if self.verdict is not None else ()
-        return {cause.id for cause in causes if cause.p >= _NAMED} - set(self.truth["neutral"])
+        return {cause.id for cause in causes if cause.p >= _NAMED} - (set(self.truth["neutral"]) - self.ids)
 
     @property
     def right(self) -> bool:

@@ -14,19 +14,21 @@ from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.story import Overlay
-from kurumaisu.critic.values.verdict import ChannelGain, Gain
+from kurumaisu.critic.values.verdict import Cause, ChannelGain, Gain
 
 
 @dataclass(frozen=True)
 class Extension:
     """What extends a model. forecast: of the base, None where nothing drove it; scans: the laser's and the map's.
 
-    refit: returns the base's part as fitted without the run of a name.
+    refit: returns the base's part as fitted without the run of a name; points: causes of a confounded set that put the
+    reference elsewhere than base_link, as they would be.
     """
 
     forecast: Forecast | None
     scans: Settings
     refit: Callable[[str], Settings]
+    points: tuple[Cause, ...] = ()
 
     @property
     def empty(self) -> bool:

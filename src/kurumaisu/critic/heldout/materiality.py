@@ -12,7 +12,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import whitened
-from kurumaisu.critic.values.verdict import NORMAL90, Gain
+from kurumaisu.critic.values.verdict import NORMAL90, ChannelGain, Gain
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
 
@@ -29,8 +29,8 @@ CERTAIN = 12.0  # [nat] of evidence from which data held out need but gain
 HORIZON = 2.0  # [s] over which ways and turns are compared
 
 
-def confirmed(gain: Gain | None, nats: float, *, free: bool = False) -> bool:
-    """Return whether drives held out confirm a finding that gains so much evidence on the drives it was fitted to.
+def confirmed(gain: Gain | ChannelGain | None, nats: float, *, free: bool = False) -> bool:
+    """Return whether data held out confirm a finding that gains so much evidence on the drives it was fitted to.
 
     Blocks of a few drives scatter widely: what is certain by the evidence need not be so by the blocks again. A short
     drive held out may gain by chance as little as what is not there would lose, but for a free curve, which has sizes

@@ -13,10 +13,11 @@ from kurumaisu.critic.experiment.proposal import drives as scripted_drives
 from kurumaisu.critic.experiment.proposal import propose
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.heldout.extension_gain import Extension
-from kurumaisu.critic.judge import excitation, explain, explain_unknown, multipliers, unresolved
+from kurumaisu.critic.judge import excitation, explain, explain_unknown, intervals, multipliers, unresolved
 from kurumaisu.critic.judge.decide import Decision, decide, noise_residuals
 from kurumaisu.critic.judge.forecast import forecast_of
 from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
+from kurumaisu.critic.judge.reference_point import is_point
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.sanity import early_stamps
@@ -25,7 +26,7 @@ from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry, of_turning
 from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import Gain, RobotTaken
+from kurumaisu.critic.values.verdict import Cause, Gain, RobotTaken
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 
@@ -78,7 +79,19 @@ def criticise_drives(
     found = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=found)
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
-    return judged, _extension(made, forecast_of(made, judged.settings, baseline), train)
+    extension = _extension(made, forecast_of(made, judged.settings, baseline), train)
+    return judged, replace(extension, points=_points(made, judged.verdict.confounded))
+
+
+def _points(made: Decision, sets: Sequence[Sequence[str]]) -> tuple[Cause, ...]:
+    """Return effects of some sets on what the reference measures, each as if it alone of its set acted."""
+    best, out = made.found.best, list[Cause]()
+    for group in sets:
+        for name in filter(is_point, group):
+            fit = made.problem.fit((best.ids - set(group)) | {name}, best.start)
+            sizes = intervals.estimates(made.problem, fit, name)
+            out.append(Cause(name, made.found.p[name], sizes, 0.0))
+    return tuple(out)
 
 
 def _looked_for(

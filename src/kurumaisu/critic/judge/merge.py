@@ -9,6 +9,7 @@ from operator import itemgetter
 
 from kurumaisu import effects
 from kurumaisu.critic.experiment.proposal import LISTED_IDS
+from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
@@ -80,12 +81,15 @@ def _told(one: Unknown, verdict: Verdict) -> bool:
 def confirmed_scans(
     finding: LaserFinding, measure: Callable[[Settings], ChannelGain | None]
 ) -> tuple[LaserFinding, ChannelGain | None]:
-    """Return a finding without what scans held out refuse, and what the rest is worth.
+    """Return a finding without what scans held out refuse, or do not confirm, and what the rest is worth.
 
     measure: returns what settings are worth. Where one of them loses it all, the others stay.
     """
     worth = measure(finding.settings)
-    if worth is None or not finding.settings or worth.log_density_per_sample.hi90 >= 0:
+    if worth is None or not finding.settings:
+        return finding, worth
+    finding, worth = _without_faint(finding, worth, measure)
+    if worth is None or worth.log_density_per_sample.hi90 >= 0:
         return finding, worth
     ids = {setting.id for setting in finding.settings}
     kept: list[tuple[float, LaserFinding, ChannelGain]] = []
@@ -100,17 +104,42 @@ def confirmed_scans(
     return rest, gained
 
 
-def refuted(finding: LaserFinding, worth: ChannelGain, gone: Set[str]) -> LaserFinding:
-    """Return a finding without what predicts scans held out worse than the model does, which is chance's.
+def _without_faint(
+    finding: LaserFinding, worth: ChannelGain, measure: Callable[[Settings], ChannelGain | None]
+) -> tuple[LaserFinding, ChannelGain | None]:
+    """Return a finding without causes of little evidence by which scans held out gain nothing, and what it is worth."""
+    gained: ChannelGain | None = worth
+    for cause in finding.causes:
+        if cause.gain_nats >= CERTAIN or gained is None:
+            continue
+        words = (
+            f"laser: {cause.id} is likely by the scans that it was found in ({cause.gain_nats:.1f} nats), but scans "
+            "held out do not confirm it, so it is not told."
+        )
+        rest = _without(finding, {cause.id}, words)
+        left = measure(rest.settings) if rest.settings else None
+        alone = left is None and confirmed(gained, cause.gain_nats)
+        if not alone and (left is None or left.log_density_per_sample.gain >= gained.log_density_per_sample.gain):
+            finding, gained = rest, left
+    return finding, gained
 
-    What extends no model, an error of the reference's poses, was not asked of them, and stays.
-    """
+
+def refuted(finding: LaserFinding, worth: ChannelGain, gone: Set[str]) -> LaserFinding:
+    """Return a finding without what predicts scans held out worse than the model does, which is chance's."""
     density = worth.log_density_per_sample
     words = (
         f"laser: {', '.join(sorted(gone))} explain the scans that they were found in, but with all that was found "
         f"scans held out lose {-density.gain:.3g} nats per reading (90 % {-density.hi90:.3g} to {-density.lo90:.3g}), "
         "so they are not told."
     )
+    return _without(finding, gone, words)
+
+
+def _without(finding: LaserFinding, gone: Set[str], words: str) -> LaserFinding:
+    """Return a finding without some effects, and why.
+
+    What extends no model, an error of the reference's poses, was not asked of scans held out, and stays.
+    """
     strange = any(name.startswith(effects.SMOOTH) for name in gone)
     return replace(
         finding,

@@ -18,7 +18,7 @@ from kurumaisu.critic.judge.clock_drift import Look
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.verdict import NORMAL90, Cause
-from kurumaisu.effects import BeamEffect, Beams, Context, Reference, ReferenceEffect
+from kurumaisu.effects import BeamEffect, Beams, Context, Mechanism, Reference, ReferenceEffect
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -50,6 +50,46 @@ def from_base_link(
     ]
     there = tuple(setting for setting in finding.settings if setting.id in told)
     return replace(again, details=(*again.details, *words)), (*again.settings, *there)
+
+
+def is_point(name: str) -> bool:
+    """Tell whether an effect is one on what the reference measures: it may put that elsewhere than base_link."""
+    return issubclass(effects.by_id(name), ReferenceEffect)
+
+
+def refuted(
+    points: Sequence[Cause],
+    sets: Sequence[Sequence[str]],
+    finding: LaserFinding,
+    recording: Recording,
+    model: Model,
+    look: Look,
+) -> dict[str, str]:
+    """Return which effects of some sets the scans tell not to act, and why.
+
+    points: those of the sets that put the reference elsewhere, as they would be; look: asks scans for the laser's place
+    alone. A reference that is elsewhere shows in the scans as a laser that is as far off the other way. Where it does,
+    nothing else of its set is needed; where it does not, and scans taken from where the chair would be do show a laser
+    that is off, it is not.
+    """
+    out: dict[str, str] = {}
+    for cause in points if finding.refused is None and finding.wrong is None else ():
+        shift = _shift(cause, model)
+        if shift is None:
+            continue
+        if _undone(shift, finding, model):
+            others = {name for group in sets if cause.id in group for name in group if name != cause.id}
+            out |= dict.fromkeys(others, f"the scans see the laser where {cause.id} would have it")
+            continue
+        there = replace(recording, runs=tuple(_moved(run, -shift.by) for run in recording.runs))
+        if _undone(replace(shift, by=-shift.by), look(there), model):
+            out[cause.id] = "with it the scans would see the laser elsewhere than it is"
+    return out
+
+
+def _undone(point: _Shift, finding: LaserFinding, model: Model) -> bool:
+    """Tell whether scans see a laser that is off as it is by a shift of the reference."""
+    return any(shift.undoes(point) for cause in finding.causes if (shift := _shift(cause, model)) is not None)
 
 
 def _moved(run: Run, by: FloatArray) -> Run:
@@ -97,3 +137,15 @@ def _placed_by(name: str, model: Model) -> _Place | None:
     if issubclass(effect, BeamEffect):
         return lambda values: effect(values, rng).apply(Beams.single()).mount
     return None
+
+
+def _mounts(effect: type[Mechanism]) -> bool:
+    """Tell whether an effect puts the laser elsewhere."""
+    if not issubclass(effect, BeamEffect):
+        return False
+    null, usual = ({p.name: p.null + far * p.scale for p in effect.parameters} for far in (0.0, 1.0))
+    places = [effect(values, np.random.default_rng(0)).apply(Beams.single()).mount for values in (null, usual)]
+    return bool(np.abs(places[1] - places[0]).max() > _SHIFT)
+
+
+PLACES = frozenset(effect.id for effect in effects.ALL if _mounts(effect))  # effects that put the laser elsewhere

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Shots, with_own
+from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.mean_effects import MeanEffects
@@ -91,12 +91,17 @@ def _of_readings(
     measured = few.shots.measured
     error = np.where(np.isfinite(measured), fit.left[rows], np.nan)
     seen = statistics.of(measured, error)
+    walls = [few.marks.seen]  # what beams may meet: stairs are finer than errors of poses, and scatter readings farther
+    if few.shots.walls.drawn is not None:
+        walls.append(hits_of(replace(few.shots, walls=few.shots.walls.drawn), (), 0, like=few.marks.seen))
     heard = ~statistics.of_errors() | (not strange)
 
     def searched(shots: Shots, curve: float = 0.0) -> tuple[ScatterSimulator, ScatterSearch, list[ScatterEffect]]:
-        simulate = ScatterSimulator(shots, few.marks, statistics, fit.missed[rows])
-        search = ScatterSearch(ScatterFit(simulate, seen, sorted(means), ids, heard), curve)
-        return simulate, search, search.run()
+        tried = [ScatterSimulator(shots, few.marks, statistics, fit.missed[rows], met) for met in walls]
+        fits = [ScatterFit(simulate, seen, sorted(means), ids, heard) for simulate in tried]
+        likeliest = int(np.argmin([one.likeness.cost(one.likeness.offset) for one in fits]))
+        search = ScatterSearch(fits[likeliest], curve)
+        return tried[likeliest], search, search.run()
 
     simulate, search, found = searched(few.shots)
     known = ScatterCurves(few, statistics, simulate, error)

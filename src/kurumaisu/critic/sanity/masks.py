@@ -15,7 +15,7 @@ from kurumaisu.critic.sanity.pose_jumps import jumps
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import Model
-from kurumaisu.types import BoolArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _BACK = 5.0  # [s] within which a reference that was elsewhere is back
 _SAME = 0.5  # share of its first jump that is left when it is back
@@ -76,11 +76,12 @@ def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
 def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
     """Return first row, end and distance [m] of each stretch that is off, however it jumps about meanwhile."""
     lasting, single = jumps(pose, 1.0, command)
-    step = np.diff(pose.values[:, :2], axis=0)
+    jumped = sorted({*lasting, *single})
+    step = _beyond_motion(pose, jumped)
     found: list[tuple[int, int, float]] = []
     away, last = 0, 0  # rows at which it left, and jumped last
     off, far = np.zeros(2), 0.0  # how far it is off, and was at most
-    for i in sorted({*lasting, *single}):
+    for i in jumped:
         if away in single and last == away and i > away + 1 and _alone(pose, away):
             found.append((away, away + 1, far))  # its way back was no jump
             away = 0
@@ -94,6 +95,16 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
         found.append((away, away + 1, far))
     return found
+
+
+def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
+    """Return by how much each row (n - 1, 2) [m] is off the one before, beyond what the rows about jumps move."""
+    step, lasts = np.diff(pose.values[:, :2], axis=0), np.diff(pose.t)[:, np.newaxis]
+    quiet = np.setdiff1d(np.arange(1, len(pose.t)), jumped)
+    if not len(quiet):
+        return step
+    rates = (step / lasts)[quiet - 1]
+    return np.asarray(step - lasts * np.column_stack([np.interp(pose.t[1:], pose.t[quiet], one) for one in rates.T]))
 
 
 def _alone(pose: Series, row: int) -> bool:

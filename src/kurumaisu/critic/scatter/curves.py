@@ -88,6 +88,8 @@ class ScatterCurves:
 
     def run(self, beside: Sequence[EffectSetting]) -> list[ScatterCurve]:
         """Return the curve that acts beside effects, and the others behind it; none where there is too little."""
+        if not self._measured.counted.any():
+            return []
         simulated = self._simulated(beside)
         found = [self._weighed(name, simulated) for name in self._curves]
         total = logsumexp([0.0, *(one.nats for one in found)])

@@ -241,7 +241,7 @@ class ScatterSearch:
             [self._fit.together([*like, new], beside), *self._other_way(pushes, like, new, beside)], key=_cost
         )
         for old in like:
-            fewer, more = self._fit.together([piece for piece in group if piece.effect is not old.effect], beside)
+            fewer, more = min(self._without_it(pushes, _without_piece(group, old), beside), key=_cost)
             z = np.sqrt(max(2 * (more - cost), 0.0))
             nats = more - cost - float(occam(np.array(z))) - old.price
             if nats < _ENOUGH:
@@ -250,6 +250,22 @@ class ScatterSearch:
             else:
                 group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
         return [*rest, *group]
+
+    def _without_it(
+        self, pushes: Sequence[StatisticsChange], left: Sequence[ScatterPiece], beside: Sequence[EffectSetting]
+    ) -> Iterator[tuple[list[ScatterPiece], float]]:
+        """Yield fits of those that are left of a group, and their misfits: as they are, and one of them begun anew.
+
+        Beside the one that is gone, their further parameters did what it did not.
+        """
+        yield self._fit.together(left, beside)
+        for piece in left:
+            others = _without_piece(left, piece)
+            known = (*beside, *(other.setting for other in others))
+            own = [push for push in pushes if push.effect is piece.effect]
+            start = self._fit.rough(own, self._fit.statistics(known, (1, 2)))
+            one, cost = self._fit.alone(start, known)
+            yield [*others, replace(piece, setting=one.setting, free=one.free)], cost
 
     def _other_way(
         self,

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.scans.beams import Shots, model_effects_with, read
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, model_effects_with, read
 from kurumaisu.critic.ranges.signals.effect_columns import EffectColumns
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.statistics import Statistics
@@ -20,9 +20,19 @@ from kurumaisu.types import FloatArray
 class ScatterSimulator:
     """Statistics of the shots with effects on how readings scatter."""
 
-    def __init__(self, shots: Shots, marks: EffectColumns, statistics: Statistics, missed: FloatArray) -> None:
-        """Take shots and their marks; missed (k, b, n) [m]: what equations of the mean may have wrong, 1 sd."""
-        self._shots, self._marks = shots, marks
+    def __init__(
+        self,
+        shots: Shots,
+        marks: EffectColumns,
+        statistics: Statistics,
+        missed: FloatArray,
+        met: BeamHits | None = None,
+    ) -> None:
+        """Take shots and their marks; missed (k, b, n) [m]: what equations of the mean may have wrong, 1 sd.
+
+        met: what beams meet, None: what they are expected to.
+        """
+        self._shots, self._marks, self._met = shots, marks, marks.seen if met is None else met
         self._statistics = statistics
         self._missed = missed
 
@@ -52,7 +62,7 @@ class ScatterSimulator:
 
     def scans(self, settings: Sequence[EffectSetting], seed: int) -> tuple[FloatArray, FloatArray]:
         """Return the readings (k, b) [m] of a simulation, and how far they are off their mean; NaN where none is."""
-        shots, seen, base = self._shots, self._marks.seen, self._marks.base
+        shots, seen, base = self._shots, self._met, self._marks.base
         rng = np.random.default_rng([seed, 7])
         chain = effects.build_laser(model_effects_with(shots, settings), np.random.default_rng(seed))
         error = shots.laser.error

@@ -36,7 +36,7 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
 def beside_odometry(ids: frozenset[str] | None) -> frozenset[str]:
     """Return those of these effects, None for all, that may act between what odometry says and how a robot moves."""
     known = {effect.id for effect in effects.BASE if effect.in_odometry}
-    return _those(ids) - known
+    return those(ids) - known
 
 
 def of_turning(ids: frozenset[str] | None) -> frozenset[str]:
@@ -47,10 +47,11 @@ def of_turning(ids: frozenset[str] | None) -> frozenset[str]:
     timely = (effects.Stage.TRANSPORT, effects.Stage.REFERENCE)
     lost = {each.id for each in effects.BASE if each.shows_in is effects.Rate.V and each.stage not in timely}
     apart = {each.id for each in effects.BASE if each.separable}
-    return _those(ids) - (lost - apart)
+    return those(ids) - (lost - apart)
 
 
-def _those(ids: frozenset[str] | None) -> frozenset[str]:
+def those(ids: frozenset[str] | None) -> frozenset[str]:
+    """Return the ids of these effects, None for all, and the word for what is not in the catalogue."""
     return ids if ids is not None else frozenset((*(effect.id for effect in effects.ALL), effects.SMOOTH))
 
 

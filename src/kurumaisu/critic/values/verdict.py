@@ -273,6 +273,6 @@ def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
     groups: dict[str, list[str]] = {}
     for problem in problems:
         where, _, what = problem.partition(": ")
-        kind = what.partition(": ")[0]
+        kind = what.partition(" (first")[0].partition(": ")[0]
         groups.setdefault(kind or where, []).append(problem)
     return list(groups.items())

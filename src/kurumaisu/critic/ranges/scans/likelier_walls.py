@@ -16,11 +16,16 @@ _CLIP = 3.0  # robust sds at which a reading counts as an outlier
 _ROUNDS = 3  # of fitting poses to scans
 _TRIES = 40
 _LEFT = 0.5  # share of the readings of straight walls that are away from edges of stairs, below which too few are left
+_ROUGHER = (
+    1.1  # times as far as about the others, up to which walls may as well be those of which readings scatter more
+)
 _SEARCHED = np.array([0.003, 0.003, 0.001])  # [m, rad] of them about what was fitted, 1 sd, at first
 
 
 def with_likelier_walls(shots: Shots) -> Shots:
     """Return shots with straight walls in place of pixels, unless the readings have their stairs: then with those.
+
+    Where these are so fine that they are lost in the noise, nobody can say: straight walls have both, then.
 
     Whether they have is seen where the scans put the chair: a reference that errs by more than a pixel tells nothing.
     """
@@ -33,6 +38,8 @@ def with_likelier_walls(shots: Shots) -> Shots:
     straight, drawn = (
         _least_scatter(replace(even, walls=walls), place, met) for walls in (shots.walls, shots.walls.drawn)
     )
+    if met.any() and drawn / _ROUGHER < straight < _ROUGHER * drawn:
+        return shots
     if straight < drawn or not met.any():
         return replace(shots, walls=replace(shots.walls, drawn=None))
     _, left = _errors(replace(even, walls=shots.walls.drawn), place)
