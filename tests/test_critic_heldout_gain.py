@@ -31,6 +31,7 @@ from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
     Cause,
+    ChannelGain,
     Gain,
     LogDensityGain,
     RmseGain,
@@ -275,6 +276,25 @@ def test_what_scans_held_out_refuse_is_not_told(tmp_path):
     told = with_scans(replace(bare(), verdict=Verdict("none")), left)
     assert told.verdict.verdict == "none"
     assert told.settings == ()
+
+
+@pytest.mark.parametrize(("nats", "gain", "told"), [(3.0, 0.0, False), (3.0, 0.02, True), (30.0, 0.0, True)])
+def test_little_evidence_must_hold_on_scans_held_out(nats, gain, told):
+    """Beside another cause as alone; what is certain must but not lose."""
+    settings = tuple(EffectSetting(name, {}) for name in ("laser.scale", "laser.offset"))
+    faint, sure = Cause("laser.scale", 0.95, {}, nats), Cause("laser.offset", 1.0, {}, 90.0)
+
+    def worth(some):
+        seen = 0.5 * ("laser.offset" in {one.id for one in some}) + gain * ("laser.scale" in {one.id for one in some})
+        return ChannelGain(LogDensityGain(0.0, seen, seen, seen - 0.01, seen + 0.01))
+
+    left, gained = confirmed_scans(LaserFinding((faint,), settings=settings[:1]), worth)
+    assert [cause.id for cause in left.causes] == ["laser.scale"][: int(told)]
+    assert (gained is not None) == told
+    assert any("do not confirm it" in line for line in left.details) != told
+    left, gained = confirmed_scans(LaserFinding((faint, sure), settings=settings), worth)
+    assert [cause.id for cause in left.causes] == ["laser.scale", "laser.offset"][1 - told :]
+    assert gained == worth(left.settings)
 
 
 def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):

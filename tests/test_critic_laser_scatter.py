@@ -69,6 +69,39 @@ def test_what_is_likeliest_alone_is_weighed_again_in_company():
     assert {each.setting.id for each in found} == {setting.id for setting in truth}
 
 
+class _Tails(_Linear):
+    """As tails do: how wide the core is shows only where there are tails."""
+
+    def __call__(self, settings, seed):
+        return super().__call__(
+            [
+                EffectSetting(
+                    one.id, {**one.parameters, "core": one.parameters["core"] * (one.parameters["inverse_nu"] > 0)}
+                )
+                if "core" in one.parameters
+                else one
+                for one in settings
+            ],
+            seed,
+        )
+
+
+def test_tails_that_widen_the_noise_are_no_wider_noise_besides():
+    """Wider noise is taken first, for it explains most; the tails are then of another form beside it than alone."""
+    simulate = _Tails(
+        {
+            "laser.range_noise.share": (3.0, 3.0, 3.0, 3.0, 3.0),
+            "laser.heavy_tails.inverse_nu": (0.0, 0.0, 0.0, 0.0, 3.0),
+            "laser.heavy_tails.core": (3.0, 3.0, 3.0, 3.0, 3.0),
+        }
+    )
+    truth = [at("laser.heavy_tails", inverse_nu=0.2, core=0.5)]
+    ids = frozenset({"laser.heavy_tails", "laser.range_noise"})
+    found = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids)).run()
+    assert [each.setting.id for each in found] == ["laser.heavy_tails"]
+    assert found[0].setting.parameters["core"] == pytest.approx(0.5, rel=0.2)
+
+
 def test_it_is_not_certain_which_of_two_alike_acts():
     simulate = _Linear({"laser.quantisation.step": (1.0,) * 5, "laser.incidence_noise.gain": (1.0,) * 5})
     ids = frozenset({"laser.quantisation", "laser.incidence_noise"})
