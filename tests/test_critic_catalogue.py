@@ -53,9 +53,11 @@ def with_lever(data, x, y):
 
 
 def test_a_lever_to_the_side_is_exactly_a_leak_of_turns_and_said_as_a_set():
-    verdict = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None).verdict
+    found = pipeline.criticise(with_lever(recording(None, 0.0, 71, 40.0), 0.0, 0.05), MD100, lambda _: None)
+    verdict = found.verdict
     assert verdict.verdict == "confounded"
     assert verdict.confounded == (("base.cross_w_to_v", "base.marker_y"),)
+    assert "scans of a known map tell what the reference measures" in found.story.next_drive
     assert verdict.causes == ()
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import logsumexp
 
+from kurumaisu import effects
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.experiment import design
 from kurumaisu.critic.experiment.design import Explanation
@@ -16,6 +17,7 @@ from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import odds
 from kurumaisu.critic.values.policy import RIVAL
 from kurumaisu.critic.values.verdict import NextExperiment
+from kurumaisu.effects import ReferenceEffect
 from kurumaisu.experiments import Script, names, shipped_script
 from kurumaisu.types import FloatArray
 
@@ -63,7 +65,9 @@ def propose(problem: Problem, found: SearchResult, scripts: Sequence[Script]) ->
     options.sort(key=lambda option: -option.expected_nats / option.script.seconds)
     listed = _listed(open_ids)
     if not options or max(option.nats for option in options) < design.NOTHING:
-        return Proposal(None, f"No scripted drive can decide whether {listed} acts: measure it in another way.", ())
+        asked = any(issubclass(effects.by_id(name), ReferenceEffect) for name in open_ids)
+        other = "scans of a known map tell what the reference measures" if asked else "measure it in another way"
+        return Proposal(None, f"No scripted drive can decide whether {listed} acts: {other}.", ())
     best = options[0]
     experiment = NextExperiment(best.script.name, best.script.seconds, best.nats, tuple(open_ids))
     sentence = (
