@@ -11,6 +11,7 @@ from kurumaisu.critic.ranges.scans.beams import hits_of, predict
 from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -53,3 +54,20 @@ def test_a_thin_wall_seen_from_its_end_has_edges_though_every_beam_misses_it(tmp
     after, seen = usable(replace(data, world=world))
     assert seen.level[scan, beam] > 2, "the beam passes it"
     assert not after[scan, beam]
+
+
+@pytest.mark.parametrize(("stands", "counted"), [(False, 0), (True, 1)])
+def test_a_scan_beyond_the_last_pose_counts_where_the_chair_stands(tmp_path, stands, counted):
+    """Held where the last pose has it, a chair that drives on would be elsewhere."""
+    data = recording(tmp_path, None, 0.0, 3, scans=20)
+    (run,) = data.runs
+    last = float(run.scan.t[-2]) + 0.35
+    kept = run.pose.t < last
+    poses = run.pose.values[kept]
+    if stands:
+        poses[run.pose.t[kept] > last - 1.0] = poses[-1]
+    pose = Series(run.pose.t[kept], poses, run.pose.columns)
+    cut = replace(data, runs=(replace(run, pose=pose),))
+    shots = gather(cut, MODEL)
+    assert (shots.stamps > last).sum() == counted
+    assert (shots.stamps < last - 0.1).sum() == 19

@@ -14,7 +14,7 @@ from kurumaisu.critic.ranges.scans.beams import RATES, Shots, Track
 from kurumaisu.critic.ranges.scans.likelier_walls import with_likelier_walls
 from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.walls import walls_at
-from kurumaisu.critic.values.recording import LaserMount, Recording, Run
+from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.effects import LAGS, FirstOrder
 from kurumaisu.params import Laser, Model, Mount
 from kurumaisu.types import FloatArray, IntArray
@@ -26,6 +26,8 @@ _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
 _GAP, _LONG = 0.3, 3.0  # [s], and usual times between poses, from which some are missing
 _STAYS = 0.02  # [m, rad] from pose to pose within which the chair may have stood meanwhile
+_HELD = 5e-3  # [m, rad] that a chair may move while a scan lasts, and stands
+_SPAN = 0.5  # [s] about the first or the last pose, over which that is seen: poses are noisy
 _PAST = 0.5  # [s] steps in which what was recorded is followed into the past
 _ABOUT = 0.15  # [s] before and after a scan, between which its rates are taken
 
@@ -142,20 +144,30 @@ def time_zero(runs: Sequence[Run]) -> float:
 def _within(run: Run) -> IntArray:
     """Return the scans of a run whose whole time lies within that of its poses, and not where some are missing.
 
-    Over a gap that it drove through, nobody knows where the chair was.
+    Over a gap that it drove through, and where it drove on after the last pose, nobody knows where the chair was.
     """
     assert run.scan is not None
     if run.pose is None:
         return np.empty(0, dtype=np.int64)
-    slack = 0.1  # [s] of extrapolation at the ends, and that a scan takes
+    slack = 0.1  # [s] that a scan takes, and of extrapolation at the ends where the chair stands
     scans, times, poses = run.scan.t, run.pose.t, run.pose.values[:, :3]
-    inside = (scans >= times[0] - slack) & (scans <= times[-1] + slack) & np.isfinite(run.scan.values).any(axis=1)
+    early, late = (slack if _moves(run.pose, end, slack) < _HELD else 0.0 for end in (0, -1))
+    inside = (scans >= times[0] - early) & (scans <= times[-1] - slack + 2 * late)
+    inside &= np.isfinite(run.scan.values).any(axis=1)
     steps = np.diff(times)
     moved = np.abs(geometry.between(poses[:-1], poses[1:])).max(axis=1, initial=0.0) > _STAYS
     gaps = np.r_[False, moved & (steps > np.maximum(_GAP, _LONG * np.median(steps) if len(steps) else 0.0)), False]
     for when in (scans, scans + slack):
         inside &= ~gaps[np.searchsorted(times, when, side="right")]
     return np.asarray(np.flatnonzero(inside))
+
+
+def _moves(pose: Series, end: int, seconds: float) -> float:
+    """Return how far [m, rad] the chair moves in some seconds [s] about the first pose (0) or the last one (-1)."""
+    near = np.flatnonzero(np.abs(pose.t - pose.t[end]) < _SPAN)
+    rows = near if len(near) > 1 else np.arange(len(pose.t))[-2:] if end else np.arange(len(pose.t))[:2]
+    moved = np.abs(geometry.between(pose.values[rows[0], :3], pose.values[rows[-1], :3])).max()
+    return float(moved * seconds / max(pose.t[rows[-1]] - pose.t[rows[0]], seconds))
 
 
 def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
