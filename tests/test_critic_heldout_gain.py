@@ -5,6 +5,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from kurumaisu.critic.heldout.corrected_scans import corrected
 from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
 from kurumaisu.critic.judge.merge import confirmed_scans, refuted, with_scans
 from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
@@ -292,7 +293,9 @@ def test_little_evidence_must_hold_on_scans_held_out(nats, gain, told):
     assert [cause.id for cause in left.causes] == ["laser.scale"][: int(told)]
     assert (gained is not None) == told
     assert any("do not confirm it" in line for line in left.details) != told
-    left, gained = confirmed_scans(LaserFinding((faint, sure), settings=settings), worth)
+    pictures = Pictures(misfits=tuple(SimpleNamespace(explained_by=one.id) for one in settings))
+    left, gained = confirmed_scans(LaserFinding((faint, sure), settings=settings, pictures=pictures), worth)
+    assert [one.explained_by for one in left.pictures.misfits] == ["laser.scale", "laser.offset"][1 - told :]
     assert [cause.id for cause in left.causes] == ["laser.scale", "laser.offset"][1 - told :]
     assert gained == worth(left.settings)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.judge.clock_drift import without_double_delay
-from kurumaisu.critic.judge.reference_point import from_base_link, refuted
+from kurumaisu.critic.judge.reference_point import from_base_link, ruled_out
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search.confounding import confounded
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
@@ -125,7 +125,7 @@ def test_scans_tell_which_point_the_reference_measures(mount, there, out):
 
     pose = Series(np.array([0.0]), np.array([[1.0, 2.0, 0.0]]), ("x", "y", "theta"))
     recording = Recording("drives", (Run("one", pose=pose),), ("one",))
-    told = refuted((point,), (SET,), seen(mount), recording, MODEL, look)
+    told = ruled_out((point,), (SET,), seen(mount), recording, MODEL, look)
     assert list(told) == out
     if out != ["base.cross_w_to_v"]:
         assert looked[0].runs[0].pose.values[0, :2] == pytest.approx([1.0, 1.98]), "from where base_link would be"
@@ -133,7 +133,7 @@ def test_scans_tell_which_point_the_reference_measures(mount, there, out):
 
 def test_scans_that_say_nothing_refute_nothing():
     point, finding = cause("base.marker_y", "y", 0.020, 0.001), LaserFinding(refused="there is no map")
-    assert refuted((point,), (SET,), finding, Recording("none", (), ()), MODEL, None) == {}
+    assert ruled_out((point,), (SET,), finding, Recording("none", (), ()), MODEL, None) == {}
 
 
 def test_what_shifts_no_point_is_left_alone():

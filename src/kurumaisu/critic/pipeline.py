@@ -17,7 +17,7 @@ from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
-from kurumaisu.critic.judge.reference_point import PLACES, from_base_link, refuted
+from kurumaisu.critic.judge.reference_point import PLACES, from_base_link, ruled_out
 from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
@@ -111,7 +111,7 @@ def _beside_scans(
     def mounted(there: Recording) -> LaserFinding:
         return criticise_scans(there, model, progress, PLACES)
 
-    told = refuted(extension.points, base.verdict.confounded, scans, recording, model, mounted)
+    told = ruled_out(extension.points, base.verdict.confounded, scans, recording, model, mounted)
     if not told:
         return base, extension
     progress("judging the drives again, without what the scans refute")

@@ -140,7 +140,12 @@ def _without(finding: LaserFinding, gone: Set[str], words: str) -> LaserFinding:
 
     What extends no model, an error of the reference's poses, was not asked of scans held out, and stays.
     """
-    strange = any(name.startswith(effects.SMOOTH) for name in gone)
+    strange, shown = any(name.startswith(effects.SMOOTH) for name in gone), finding.pictures
+    left = Pictures(
+        misfits=tuple(one for one in shown.misfits if one.explained_by not in gone),
+        noise=shown.noise,
+        comparisons=tuple(one for one in shown.comparisons if not gone & set(one.explained_by.split(" + "))),
+    )
     return replace(
         finding,
         causes=tuple(cause for cause in finding.causes if cause.id not in gone),
@@ -148,7 +153,7 @@ def _without(finding: LaserFinding, gone: Set[str], words: str) -> LaserFinding:
         unknown=tuple(one for one in finding.unknown if one.channel in _POSES or not strange),
         settings=tuple(setting for setting in finding.settings if setting.id not in gone),
         details=(*finding.details, words),
-        pictures=Pictures(noise=finding.pictures.noise),
+        pictures=left,
     )
 
 

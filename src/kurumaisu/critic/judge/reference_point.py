@@ -57,7 +57,7 @@ def is_point(name: str) -> bool:
     return issubclass(effects.by_id(name), ReferenceEffect)
 
 
-def refuted(
+def ruled_out(
     points: Sequence[Cause],
     sets: Sequence[Sequence[str]],
     finding: LaserFinding,

@@ -165,9 +165,11 @@ def _within(run: Run) -> IntArray:
 def _moves(pose: Series, end: int, seconds: float) -> float:
     """Return how far [m, rad] the chair moves in some seconds [s] about the first pose (0) or the last one (-1)."""
     near = np.flatnonzero(np.abs(pose.t - pose.t[end]) < _SPAN)
-    rows = near if len(near) > 1 else np.arange(len(pose.t))[-2:] if end else np.arange(len(pose.t))[:2]
-    moved = np.abs(geometry.between(pose.values[rows[0], :3], pose.values[rows[-1], :3])).max()
-    return float(moved * seconds / max(pose.t[rows[-1]] - pose.t[rows[0]], seconds))
+    if len(near) < 2:
+        near = np.arange(len(pose.t))[-2:] if end else np.arange(len(pose.t))[:2]
+    first, last = near[[0, -1]]
+    moved = np.abs(geometry.between(pose.values[first, :3], pose.values[last, :3])).max()
+    return float(moved * seconds / max(pose.t[last] - pose.t[first], seconds))
 
 
 def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:

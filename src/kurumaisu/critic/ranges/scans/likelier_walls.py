@@ -16,9 +16,7 @@ _CLIP = 3.0  # robust sds at which a reading counts as an outlier
 _ROUNDS = 3  # of fitting poses to scans
 _TRIES = 40
 _LEFT = 0.5  # share of the readings of straight walls that are away from edges of stairs, below which too few are left
-_ROUGHER = (
-    1.1  # times as far as about the others, up to which walls may as well be those of which readings scatter more
-)
+_ROUGHER = 1.1  # times as far as readings scatter about the others, up to which nobody can say which walls they are of
 _SEARCHED = np.array([0.003, 0.003, 0.001])  # [m, rad] of them about what was fitted, 1 sd, at first
 
 
