@@ -279,6 +279,19 @@ def test_what_scans_held_out_refuse_is_not_told(tmp_path):
     assert told.settings == ()
 
 
+@pytest.mark.parametrize(
+    ("group", "words"),
+    [
+        (("laser.clock_skew", "laser.latency"), "record a longer drive with more turns"),
+        (("laser.offset", "laser.warmup"), "measure it in another way"),
+    ],
+)
+def test_a_set_of_the_laser_that_no_experiment_decides_says_what_would(group, words):
+    told = with_scans(replace(bare(), verdict=Verdict("none")), LaserFinding(confounded=(group,)))
+    assert told.verdict.confounded == (group,)
+    assert told.story.next_drive == f"No scripted experiment can decide whether {' or '.join(group)} acts: {words}."
+
+
 @pytest.mark.parametrize(("nats", "gain", "told"), [(3.0, 0.0, False), (3.0, 0.02, True), (30.0, 0.0, True)])
 def test_little_evidence_must_hold_on_scans_held_out(nats, gain, told):
     """Beside another cause as alone; what is certain must but not lose."""

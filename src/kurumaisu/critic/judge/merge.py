@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Callable, Sequence, Set
 from dataclasses import replace
 from operator import itemgetter
 
@@ -160,6 +160,8 @@ def _without(finding: LaserFinding, gone: Set[str], words: str) -> LaserFinding:
 def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
     """Return a criticism that proposes what the scans need, where the drives need nothing."""
     drive = finding.next_experiment
+    if drive is None and finding.confounded and not criticism.story.next_drive:
+        return replace(criticism, story=replace(criticism.story, next_drive=_undecided(finding.confounded[0])))
     if drive is None or criticism.verdict.next_experiment is not None:
         return criticism
     first, more = ", ".join(drive.separates[:LISTED_IDS]), len(drive.separates) - LISTED_IDS
@@ -170,6 +172,13 @@ def _with_drive(criticism: Criticism, finding: LaserFinding) -> Criticism:
         verdict=replace(criticism.verdict, next_experiment=drive),
         story=replace(criticism.story, next_drive=criticism.story.next_drive or sentence),
     )
+
+
+def _undecided(names: Sequence[str]) -> str:
+    """Return in a sentence what would tell effects from each other that no scripted experiment for the laser does."""
+    moving = all(getattr(effects.by_id(name), "stage", None) is effects.LaserStage.GEOMETRY for name in names)
+    other = "record a longer drive with more turns" if moving else "measure it in another way"
+    return f"No scripted experiment can decide whether {' or '.join(names)} acts: {other}."
 
 
 def headline(finding: LaserFinding) -> str:
