@@ -17,7 +17,7 @@ from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
 from kurumaisu.critic.judge.extended_model import extended_text
 from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
-from kurumaisu.critic.judge.reference_point import PLACES, from_base_link, ruled_out
+from kurumaisu.critic.judge.reference_point import from_base_link, mountings, ruled_out
 from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
@@ -109,7 +109,7 @@ def _beside_scans(
     """Return what the drives say, without what the scans refute of their sets."""
 
     def mounted(there: Recording) -> LaserFinding:
-        return criticise_scans(there, model, progress, PLACES)
+        return criticise_scans(there, model, progress, mountings(model))
 
     told = ruled_out(extension.points, base.verdict.confounded, scans, recording, model, mounted)
     if not told:

@@ -18,7 +18,7 @@ from kurumaisu.critic.judge.clock_drift import Look
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.verdict import NORMAL90, Cause
-from kurumaisu.effects import BeamEffect, Beams, Context, Mechanism, Reference, ReferenceEffect
+from kurumaisu.effects import BeamEffect, Beams, Context, Reference, ReferenceEffect
 from kurumaisu.geometry import compose
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -55,6 +55,17 @@ def from_base_link(
 def is_point(name: str) -> bool:
     """Tell whether an effect is one on what the reference measures: it may put that elsewhere than base_link."""
     return issubclass(effects.by_id(name), ReferenceEffect)
+
+
+def mountings(model: Model) -> frozenset[str]:
+    """Return the effects that put the laser elsewhere."""
+    out = set()
+    for effect in effects.LASER:
+        place = _placed_by(effect.id, model)
+        null, usual = ({p.name: p.null + far * p.scale for p in effect.parameters} for far in (0.0, 1.0))
+        if place is not None and np.abs(place(usual) - place(null)).max() > _SHIFT:
+            out.add(effect.id)
+    return frozenset(out)
 
 
 def ruled_out(
@@ -137,15 +148,3 @@ def _placed_by(name: str, model: Model) -> _Place | None:
     if issubclass(effect, BeamEffect):
         return lambda values: effect(values, rng).apply(Beams.single()).mount
     return None
-
-
-def _mounts(effect: type[Mechanism]) -> bool:
-    """Tell whether an effect puts the laser elsewhere."""
-    if not issubclass(effect, BeamEffect):
-        return False
-    null, usual = ({p.name: p.null + far * p.scale for p in effect.parameters} for far in (0.0, 1.0))
-    places = [effect(values, np.random.default_rng(0)).apply(Beams.single()).mount for values in (null, usual)]
-    return bool(np.abs(places[1] - places[0]).max() > _SHIFT)
-
-
-PLACES = frozenset(effect.id for effect in effects.ALL if _mounts(effect))  # effects that put the laser elsewhere

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu import effects
-from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece, StatisticsChange
+from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
 from kurumaisu.critic.values.prior import log_prior, occam
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.effects import Mechanism
@@ -172,12 +172,18 @@ class ScatterSearch:
             beside = [piece.setting for piece in out if piece.effect is not old.effect]
             if len(old.free) < 2 or not beside:
                 continue
-            own = [push for push in pushes if push.effect is old.effect]
-            plain = self._fit.plain(self._fit.rough(own, self._fit.statistics(beside, (1, 2))))
+            plain = self._fit.plain(self._begun(pushes, old, beside))
             (new,), cost = self._fit.together([plain], beside)
             if cost + new.price < self._fit.misfit([*beside, old.setting]) + old.price:
                 out[i] = replace(old, setting=new.setting, free=new.free)
         return out
+
+    def _begun(
+        self, pushes: Sequence[StatisticsChange], piece: ScatterPiece, beside: Sequence[EffectSetting]
+    ) -> RoughFit:
+        """Return rough sizes of a piece's effect beside others, whatever it had been fitted to."""
+        own = [push for push in pushes if push.effect is piece.effect]
+        return self._fit.rough(own, self._fit.statistics(beside, (1, 2)))
 
     def _certain(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return the pieces weighed in the company that is there last, without those that it makes superfluous."""
@@ -262,9 +268,7 @@ class ScatterSearch:
         for piece in left:
             others = _without_piece(left, piece)
             known = (*beside, *(other.setting for other in others))
-            own = [push for push in pushes if push.effect is piece.effect]
-            start = self._fit.rough(own, self._fit.statistics(known, (1, 2)))
-            one, cost = self._fit.alone(start, known)
+            one, cost = self._fit.alone(self._begun(pushes, piece, known), known)
             yield [*others, replace(piece, setting=one.setting, free=one.free)], cost
 
     def _other_way(
@@ -284,9 +288,8 @@ class ScatterSearch:
             known = (*beside, *(piece.setting for piece in others))
             if first is None or len(old.free) < 2:
                 continue
-            own = [push for push in pushes if push.effect is old.effect]
-            start = self._fit.rough(own, self._fit.statistics((*known, first.setting), (1, 2)))
-            piece, _ = self._fit.alone(start, (*known, first.setting))
+            there = (*known, first.setting)
+            piece, _ = self._fit.alone(self._begun(pushes, old, there), there)
             both = (
                 replace(old, setting=piece.setting, free=piece.free),
                 replace(new, setting=first.setting, free=first.free),

@@ -77,7 +77,7 @@ def estimate_reading_noise(
     # Of every reading that may ever count, outliers of the last round too.
     again = (left if np.array_equal(beam.valid, first.valid) else every) / sd
     valid = first.valid & (np.abs(np.nan_to_num(again)) < OUTLIER) & ~_jolted(again, first, layout)[:, np.newaxis]
-    inside = beam.valid & (np.abs(np.nan_to_num(z, nan=np.inf)) < OUTLIER)
+    inside = beam.valid & (np.abs(z) < OUTLIER)
     rho = neighbours_correlation(z, inside)
     kept = np.where(inside, left, np.nan)
     sd = sd * _repeated(grid, first.sd, sd, layout)
