@@ -80,14 +80,20 @@ def wheels_off(curvature, half, v, w):
     return (right + left) / 2, 0.0, (right - left) / (2 * half)
 
 
+def _bent(p, rate):
+    """Less by the curvature times a power of the rate, until nothing is left of it."""
+    lost = p["curvature"] * abs(rate) ** p["power"]
+    return 0.0 if lost > 1 else rate - lost * rate
+
+
 for _name, _rule in {
     "base.gain_v": lambda p, v, w: (v + p["gain"] * v, 0.0, w),
     "base.gain_w": lambda p, v, w: (v, 0.0, w + p["gain"] * w),
     "base.left_right_gain": lambda p, v, w: (v, 0.0, w + p["asymmetry"] * abs(w) * (p["side"] * w >= 0)),
     "base.veer": lambda p, v, w: wheels_off(p["curvature"], p["apart"] / 2, v, w),
     "base.reverse_gain": lambda p, v, w: (v * (1 + p["gain"]) if v < 0 else v, 0.0, w),
-    "base.curvature_v": lambda p, v, w: (0.0 if p["curvature"] * abs(v) > 1 else v - p["curvature"] * v * abs(v), 0, w),
-    "base.curvature_w": lambda p, v, w: (v, 0, 0.0 if p["curvature"] * abs(w) > 1 else w - p["curvature"] * w * abs(w)),
+    "base.curvature_v": lambda p, v, w: (_bent(p, v), 0, w),
+    "base.curvature_w": lambda p, v, w: (v, 0, _bent(p, w)),
     "base.cross_w_to_v": lambda p, v, w: (v + p["lever"] * (abs(w) if p["even"] >= 0.5 else w), 0.0, w),
     "base.understeer": lambda p, v, w: (v, 0.0, 0.0 if p["k"] * v * v > 1 else w - p["k"] * v * v * w),
     "base.lateral_slip": lambda p, v, w: (v, -p["c"] * v * w, w),
@@ -133,7 +139,9 @@ def _swallowed(axis, rate, p):
     width = p["width"] * (abs(slope / branch(axis, 1.0)[0]) if p["even"] >= 0.5 else 1.0)
     above = volts(axis, rate) - intercept
     left = abs(above) - width
-    return math.copysign(abs(above) if p["whole"] >= 0.5 else left, above) / slope if left > 0 else 0.0
+    if 0.25 <= p["whole"] < 0.75 and left <= 0:
+        return rate * abs(above) / width
+    return math.copysign(abs(above) if p["whole"] >= 0.25 else left, above) / slope if left > 0 else 0.0
 
 
 RATES["base.dead_zone_v"] = _each(lambda p, v, w: (_swallowed("translation", v, p), 0.0, w))

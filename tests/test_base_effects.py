@@ -30,6 +30,7 @@ def apply(name, values, v=V, w=W, **more):
 STATIC = [
     ("base.reverse_gain", {"gain": 0.1}, [0.5, -0.55, 0.2, 0.0, 0.0, 1.4], W),
     ("base.curvature_v", {"curvature": 0.1}, [0.475, -0.475, 0.196, 0.0, 0.0, 1.204], W),
+    ("base.curvature_v", {"curvature": 0.1, "power": 2.0}, [0.4875, -0.4875, 0.1992, 0.0, 0.0, 1.1256], W),
     ("base.curvature_v", {"curvature": 1.0}, [0.25, -0.25, 0.16, 0.0, 0.0, 0.0], W),
     ("base.curvature_w", {"curvature": -0.1}, V, [0.309, 0.416, -0.636, 0.525, 0.0, 0.0]),
     (

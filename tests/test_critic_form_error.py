@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the equation of a cause may miss is noise beside its sizes, as large as the cause is, and no second cause."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.base.catalogue import BASE
+from kurumaisu.bench.hidden.generator.motion import Fault, Form
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
@@ -127,3 +130,20 @@ def test_a_zone_with_a_soft_corner_is_a_dead_zone_and_nothing_else(seed):
     assert found.named == ("base.dead_zone_w",)
     assert found.best.ids == {"base.dead_zone_w"}
     assert not found.confounded
+
+
+LAWS = [
+    ("base.saturation", "v", lambda v: 0.4 * np.tanh(v / 0.4)),
+    ("base.dead_zone_v", "v", lambda v: v * np.minimum(1.0, (v / 0.25) ** 2)),
+    ("base.curvature_w", "w", lambda w: w * (1 - 0.2 * np.abs(w) ** 2.5)),
+]
+
+
+@pytest.mark.parametrize(("name", "rate", "law"), LAWS)
+def test_a_law_that_is_nobody_s_first_is_still_the_cause_and_no_other_one(name, rate, law):
+    """A top speed like a tanh, a zone that lets go little by little, a gain that falls late."""
+    fault = Fault(Form("events", lambda e, _: replace(e, **{rate: law(getattr(e, rate))})), {})
+    rivals = {f"base.{kind}_{rate}" for kind in ("gain", "curvature", "dead_zone")} | {"base.saturation"}
+    found = search.search(problem_of([fault], rivals, 2), lambda _: None)
+    assert found.named == (name,)
+    assert found.best.ids == {name}

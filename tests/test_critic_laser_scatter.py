@@ -9,6 +9,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu import effects
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, estimate_reading_noise
 from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
@@ -168,6 +169,30 @@ def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(t
     )
     assert tails - plain < 4.0
     assert bursts - plain > 10.0
+
+
+@pytest.mark.parametrize("probability", [0.001, 0.02])
+def test_a_few_lost_readings_are_told_as_too_few_to_matter(tmp_path, probability):
+    """Half a percent of anything is where it begins to."""
+    data = recording(tmp_path, "laser.dropout", probability, 1, scans=60)
+    found = criticise_scans(data, MODEL, lambda _: None)
+    if probability < 0.005:
+        assert not found.causes
+        assert found.small == ("laser.dropout",)
+        assert any(line.startswith("laser.dropout: detectable, but too small") for line in found.details)
+    else:
+        assert [cause.id for cause in found.causes] == ["laser.dropout"]
+        assert not found.small
+
+
+def test_only_what_leaves_all_other_readings_as_they_are_takes_readings_away(tmp_path):
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
+    missed = np.empty((*assembly.residual.shape, 0))
+    simulate = ScatterSimulator(assembly.shots, assembly.marks, statistics, missed)
+    assert simulate.lost(at("laser.dropout", probability=0.02)) == pytest.approx(0.02, abs=0.005)
+    assert simulate.lost(at("laser.crosstalk", probability=0.1)) is None
+    assert simulate.lost(at("laser.range_noise", share=0.1)) is None
 
 
 def test_readings_of_something_else_pull_no_scan_away(tmp_path):

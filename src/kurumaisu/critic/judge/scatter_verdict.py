@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu import effects
+from kurumaisu.critic.heldout.materiality import MATERIAL
 from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
@@ -42,11 +43,15 @@ class MeanFit:
 
 @dataclass(frozen=True)
 class Scatter:
-    """What acts on how readings scatter: effects; curves in no catalogue, the likeliest first; what they mend."""
+    """What acts on how readings scatter: effects; curves in no catalogue, the likeliest first; what they mend.
+
+    slight: effects that take so few readings away that nobody misses them.
+    """
 
     effects: list[ScatterEffect]
     curves: list[ScatterCurve]
     comparisons: tuple[Comparison, ...]
+    slight: frozenset[str] = frozenset()
 
 
 def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | None, own: float) -> Scatter:
@@ -67,9 +72,10 @@ def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | N
     return replace(found, effects=scatter)
 
 
-def material(scatter: list[ScatterEffect], normal: NormalEquations, own: float) -> list[ScatterEffect]:
+def material(scatter: Scatter, normal: NormalEquations, own: float) -> list[ScatterEffect]:
     """Return the effects that matter beside what single readings scatter by; own as above."""
-    return beyond_own_offset(scatter, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
+    heard = [each for each in scatter.effects if each.setting.id not in scatter.slight]
+    return beyond_own_offset(heard, _HEARD * float(np.median(normal.beam_noise.sd[normal.beam_noise.valid])), own)
 
 
 def _of_readings(
@@ -118,7 +124,9 @@ def _of_readings(
             curves, search, found = [level, *curves[1:]], other, fewer
             break
     compared = (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
-    return Scatter(found, curves, compared)
+    losses = ((each.setting.id, simulate.lost(each.setting)) for each in found)
+    slight = frozenset(name for name, share in losses if share is not None and share < MATERIAL)
+    return Scatter(found, curves, compared, slight)
 
 
 def _stage(setting: EffectSetting) -> effects.LaserStage | None:

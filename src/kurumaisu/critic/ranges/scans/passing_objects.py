@@ -7,7 +7,7 @@ Its readings say nothing of the laser: they are set aside, and the rest is judge
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -23,6 +23,9 @@ _NEARER = 0.25  # [m] than the map, and from all that it has nearby: an error of
 _FEWEST = 4  # neighbouring beams: light of others and tails of the noise do not agree on where something is
 _SMOOTH = 0.1  # [m] between neighbours on one thing
 _WIDEST = 1.2  # [m] of a thing: what is wider, such as the floor before a tilted laser, is none
+_CLOSE = 0.1  # [m] before a wall, where poses are known by the scans: more than noise and what bends readings do
+_ON = 0.67  # share of the other readings of a place, and of a beam, that are nearer the map than that
+_OTHERS = 4  # of them, at least
 _MARGIN = 3  # beams on each side that may meet the thing in part
 _SCANS = 5  # in which things stand, before they are told
 _RARER = 3.0  # times as many as end beyond all walls: an error of the heading makes both alike
@@ -58,6 +61,20 @@ class PassingObjects:
             f"in {len(self.scans)} of {len(self.readings)} scans an object that is not in the map stands before its "
             f"walls, {self.nearer:.2g} m nearer (median), first at x {x:.2f}, y {y:.2f} m"
         )
+
+    def with_close(self, sights: Sights) -> PassingObjects:
+        """Return the same with things close before walls, as seen from where the scans were taken by themselves."""
+        core = _close(sights)
+        if not core.any():
+            return self
+        scans = np.flatnonzero(core.any(axis=1))
+        nearer = float(np.median((sights.expected - sights.measured)[core]))
+        place = np.median(sights.ends(sights.measured)[scans[0]][core[scans[0]]], axis=0)
+        readings = self.readings | _with_margin(core)
+        if not len(self.scans):
+            return PassingObjects(readings, scans, nearer, place)
+        first = place if scans[0] < self.scans[0] else self.place
+        return replace(self, readings=readings, scans=np.union1d(self.scans, scans), place=first)
 
     def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue where so much is not in the map that the map is what is wrong."""
@@ -99,8 +116,45 @@ def passing_objects(sights: Sights) -> PassingObjects:
         return PassingObjects(np.zeros_like(core), np.empty(0, dtype=np.int64), 0.0, np.zeros(2))
     scans = np.flatnonzero(core.any(axis=1))
     place = np.median(ends[scans[0]][core[scans[0]]], axis=0)
-    readings = binary_dilation(core, np.ones((1, 2 * _MARGIN + 1)))
-    return PassingObjects(readings, scans, float(np.median(nearer[core])), place)
+    return PassingObjects(_with_margin(core), scans, float(np.median(nearer[core])), place)
+
+
+def _with_margin(core: BoolArray) -> BoolArray:
+    return np.asarray(binary_dilation(core, np.ones((1, 2 * _MARGIN + 1))))
+
+
+def _close(sights: Sights) -> BoolArray:
+    """Return which readings (k, b) meet a thing before a wall that is elsewhere seen where the map has it.
+
+    By other beams, and by the same ones before other walls: then neither the map nor the laser is off.
+    """
+    nearer = sights.expected - sights.measured
+    out, known = np.zeros(nearer.shape, dtype=bool), np.isfinite(nearer)
+    if not known.any():
+        return out
+    with np.errstate(invalid="ignore"):
+        off = nearer > _CLOSE
+        too_far = list(_runs(sights.measured, -nearer > _CLOSE))
+    _, cell = np.unique(np.floor(sights.ends(sights.expected)[known] / _CELL), axis=0, return_inverse=True)
+    place = np.full(nearer.shape, -1)
+    place[known] = cell.ravel()
+    met, missed = np.bincount(place[known]), np.bincount(place[known], np.abs(nearer[known]) > _CLOSE)
+    beams, astray = known.sum(axis=0), (known & (np.abs(nearer) > _CLOSE)).sum(axis=0)
+
+    def mostly_on(seen: IntArray, wrong: FloatArray, own: int) -> bool:
+        others = int(seen.sum()) - own
+        return others >= _OTHERS * own and others - (float(wrong.sum()) - own) >= _ON * others
+
+    runs = list(_runs(sights.measured, off))
+    for k, first, stop in runs if len(runs) > _RARER * len(too_far) else ():
+        width = (stop - first) * abs(float(sights.bearings[1] - sights.bearings[0]))
+        cells = np.unique(place[k, first:stop])
+        own = slice(first, stop)
+        if width * float(np.median(sights.measured[k, own])) <= _WIDEST and mostly_on(
+            met[cells], missed[cells], stop - first
+        ):
+            out[k, own] = mostly_on(beams[own], astray[own], stop - first)
+    return out
 
 
 def _off_walls(sights: Sights, ends: FloatArray, nearer: FloatArray) -> BoolArray:

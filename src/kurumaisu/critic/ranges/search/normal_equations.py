@@ -98,15 +98,14 @@ class Assembly:
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
-        middle = shots.measured.shape[1] // 2
-        self.passing_objects = passing_objects(
-            Sights(others, self.marks.base, shots.laser.bearings, self.origins()[0][:, middle])
-        )
+        self.passing_objects = passing_objects(self._seen_by(others))
         self.mapped &= ~self.passing_objects.readings
         self.first = self._trust()
         for i in range(_SHIFTS):
             found, self.kinked = pose_corrected(self.shots, self.tracks, self.hats, self.layout, self._sights())
             self._linearise(found, roughly=i < _SHIFTS - 1)
+        self.passing_objects = self.passing_objects.with_close(self._seen_by(others))
+        self.mapped &= ~self.passing_objects.readings
         self.motion = self._motion()
         self.first = replace(self._trust(), valid=self.first.valid & self._trust().valid)
         self.geometry = usable_beams(self.shots, self.marks.seen, self.marks.base) & self.mapped
@@ -148,6 +147,11 @@ class Assembly:
         angles = poses[:, :, 2] + bearings
         way = self.marks.base[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         return np.asarray(poses[:, :, :2] + way)
+
+    def _seen_by(self, readings: FloatArray) -> Sights:
+        """Return what readings (k, b) [m] see, from where the scans are taken to be."""
+        middle = readings.shape[1] // 2
+        return Sights(readings, self.marks.base, self.shots.laser.bearings, self.origins()[0][:, middle])
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
