@@ -249,7 +249,7 @@ def test_what_clips_does_not_hide_what_else_it_may_be():
     ids = frozenset({"base.saturation", "base.dead_zone_v", "base.gain_v"})
     problem = Problem([prepare(run, MODEL)], MODEL, NOISE, ids=ids)
     top = problem.fit(["base.saturation"], {})
-    found = search.search(problem, lambda _: None, top)
+    found = search.search(problem, lambda _: None, [top])
     best = {next(iter(fit.ids)): fit for fit in reversed(found.fits) if len(fit.ids) == 1}
     assert {"base.dead_zone_v", "base.gain_v"} <= set(found.confounded[0])
     # That the top speed lies just below the one that was driven would be chance.

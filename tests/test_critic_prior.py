@@ -96,5 +96,5 @@ def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_
     more = ("payload", "delay", "curvature_v", "gain_v", "dead_zone_v", "understeer", "battery_sag", "lag_v")
     ids = frozenset(f"base.{name}" for name in more)
     problem = problem_of(case.recording.runs, quiet, ids)
-    found = search.search(problem, lambda _: None, problem.fit(["base.delay", "base.curvature_v"], {}))
+    found = search.search(problem, lambda _: None, [problem.fit(["base.delay", "base.curvature_v"], {})])
     assert found.best.ids == {"base.payload"}

@@ -9,7 +9,6 @@ import numpy as np
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
-
 _POWER = Parameter("power", "1", null=1.0, scale=1.0, lower=1.0, upper=4.0)
 _FORMS = ({"power": 1.0}, {"power": 2.0})
 

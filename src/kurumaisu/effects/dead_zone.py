@@ -31,8 +31,9 @@ def _swallow(rate: FloatArray, values: Mapping[str, float], law: AxisLaw) -> Flo
     """Return rates without what the zone swallows; a negative width adds it.
 
     width [V]: of the branch of each rate, or with even = 1 of the positive one for both, so that as much of the rate
-    is lost on either side. whole: 1 where a rate beyond the zone is left as it is, 0.5 where one within it, too, is left
-    in proportion to how far it comes, as what sticks lets go little by little; else all rates are less by the zone.
+    is lost on either side. whole: 1 where a rate beyond the zone is left as it is, 0.5 where one within it is
+    left, too, in proportion to how far it comes, as what sticks lets go little by little; else all rates are less by
+    the zone.
     side: 1 where only positive rates have the zone, as each branch of the law has its own threshold, -1: negative ones.
     """
     branch = np.ones_like(rate) if values["even"] >= 0.5 else rate

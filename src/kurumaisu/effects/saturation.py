@@ -37,7 +37,7 @@ class Saturation(Effect):
         Parameter("knee", "1", null=0.0, scale=0.1, lower=0.0, upper=1.0),
     )
     separable = True
-    forms = ({"knee": 0.0}, {"knee": 0.1}, {"knee": 0.5})
+    forms = ({"knee": 0.0}, {"knee": 0.1}, {"knee": 0.4})
     empirical = True
     sentence = "the rates saturate: above some rate the chair is slower than commanded"
     formula = "v (1 + |v · inverse_v|^(1/knee))^−knee, w likewise; knee → 0: |v| ≤ 1 / inverse_v, |w| ≤ 1 / inverse_w"

@@ -120,7 +120,7 @@ def _settled(
             break
         problem = first.changed(noise=growth.noise)
         before, had = found, curve
-        found = search.search(problem, progress, found.best if curve is None else curve.fit)
+        found = search.search(problem, progress, [*([] if curve is None else [curve.fit]), *found.likely])
         curve = likelier_curve(found)
         if found.best.ids == before.best.ids and (curve is None) == (had is None):
             break
@@ -145,7 +145,7 @@ def _hinted(problem: Problem, found: SearchResult, progress: Progress) -> Hint |
     easy = problem.changed(noise=problem.noise.quick)
     if problem.noise.slowest > _LASTS:
         progress("looking again, as if no noise were slow")
-        again = search.search(easy, progress, found.best, _LOOKS)
+        again = search.search(easy, progress, found.likely, _LOOKS)
         curve = likelier_curve(again)
         return Hint(again, curve) if curve is not None or again.best.ids != found.best.ids else None
     curves = CurveSearch(easy)

@@ -180,9 +180,7 @@ def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
     heard = replace(scatter, effects=material(scatter, normal, own))
     finding = without_double_delay(_finding(assembly, normal, made, mean.fit, heard), assembly.shots.stamps)
     slight = tuple(each.setting.id for each in scatter.effects if each not in heard.effects)
-    words = tuple(
-        f"{name}: detectable, but too small to matter." for name in slight
-    )
+    words = tuple(f"{name}: detectable, but too small to matter." for name in slight)
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
     finding = replace(finding, next_experiment=_next(finding, assembly, question.recording, question.model))
     shown = misfits(assembly, normal, made.parts())

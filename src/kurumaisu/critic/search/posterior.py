@@ -17,6 +17,7 @@ from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
+_NEAR, _LIKELY = 8.0, 5  # [nat] behind the best set within which others may be the cause in another noise; how many
 _SAID = 1e-3  # posterior from which it is asked what a curve draws
 _ENOUGH = 3  # residuals per parameter of the catalogue, at least
 
@@ -46,6 +47,16 @@ class SearchResult:
     def empty(self) -> Fit:
         """Return the fit of nothing."""
         return next(fit for fit in self.fits if not fit.candidates)
+
+    @property
+    def likely(self) -> tuple[Fit, ...]:
+        """Return the likeliest fits of some sets of effects, the best first: those that other noise may put first."""
+        least = self.log_posterior(self.best) - _NEAR
+        of_set: dict[frozenset[str], Fit] = {}
+        for fit in self.fits:
+            if self.log_posterior(fit) > least:
+                of_set.setdefault(fit.ids, fit)
+        return tuple(of_set.values())[:_LIKELY]
 
     def nats(self, fit: Fit) -> float:
         """Return the evidence [nat] of a set over nothing, none where data are too few to believe in it."""
