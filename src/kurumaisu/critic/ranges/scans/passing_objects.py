@@ -25,7 +25,7 @@ _SMOOTH = 0.1  # [m] between neighbours on one thing
 _WIDEST = 1.2  # [m] of a thing: what is wider, such as the floor before a tilted laser, is none
 _CLOSE = 0.1  # [m] before a wall, where poses are known by the scans: more than noise and what bends readings do
 _ON = 0.67  # share of the other readings of a place, and of a beam, that are nearer the map than that
-_OTHERS = 4  # of them, at least
+_OTHERS = 4  # times as many of them as are off in the scan, at least
 _MARGIN = 3  # beams on each side that may meet the thing in part
 _SCANS = 5  # in which things stand, before they are told
 _RARER = 3.0  # times as many as end beyond all walls: an error of the heading makes both alike
@@ -145,15 +145,12 @@ def _close(sights: Sights) -> BoolArray:
         others = int(seen.sum()) - own
         return others >= _OTHERS * own and others - (float(wrong.sum()) - own) >= _ON * others
 
-    runs = list(_runs(sights.measured, off))
+    runs, step = list(_runs(sights.measured, off)), abs(float(sights.bearings[1] - sights.bearings[0]))
     for k, first, stop in runs if len(runs) > _RARER * len(too_far) else ():
-        width = (stop - first) * abs(float(sights.bearings[1] - sights.bearings[0]))
-        cells = np.unique(place[k, first:stop])
-        own = slice(first, stop)
-        if width * float(np.median(sights.measured[k, own])) <= _WIDEST and mostly_on(
-            met[cells], missed[cells], stop - first
-        ):
-            out[k, own] = mostly_on(beams[own], astray[own], stop - first)
+        own, count = slice(first, stop), stop - first
+        if count * step * float(np.median(sights.measured[k, own])) <= _WIDEST:
+            cells = np.unique(place[k, own])
+            out[k, own] = mostly_on(met[cells], missed[cells], count) and mostly_on(beams[own], astray[own], count)
     return out
 
 
