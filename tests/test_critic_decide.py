@@ -56,6 +56,13 @@ def test_a_curve_that_is_another_form_of_an_effect_is_no_news(found_of):
     assert decide.likelier_curve(found_of(20.0, curve_of(30.0, form_of="a"), curve_of(29.0))) is None
 
 
+def test_sets_that_were_near_are_weighed_again_in_another_noise(monkeypatch):
+    """One fit of each, the likeliest: of what was far behind, and of other forms, nothing new comes."""
+    monkeypatch.setattr(SearchResult, "log_posterior", lambda _, one: one.score)
+    fits = fit_of(20.0, "a"), fit_of(19.0, "a"), fit_of(15.0, "b", "c"), fit_of(11.0, "d"), fit_of(0.0)
+    assert SearchResult(fits, (), {}, {}, ()).likely == (fits[0], fits[2])
+
+
 def test_few_data_show_no_curve(found_of):
     assert decide.likelier_curve(found_of(20.0, curve_of(30.0), enough=False)) is None
 
