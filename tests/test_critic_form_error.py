@@ -149,12 +149,3 @@ def test_a_law_that_is_nobody_s_first_is_one_cause_still(rate, law, right):
     assert len(found.best.ids) == 1
     assert found.best.ids <= right
     assert set(found.named) <= right
-
-
-def test_both_rates_limited_softly_are_one_cause_whose_forms_crowd_nothing_out():
-    """Of nine forms of a limit that promise alike, or four of a bent law, some would be all that is tried."""
-    soft = Form("events", lambda e, _: replace(e, v=np.tanh(0.9 * e.v) / 0.9, w=np.tanh(0.9 * e.w) / 0.9))
-    rivals = {f"base.{kind}_{rate}" for kind in ("gain", "curvature", "dead_zone") for rate in "vw"}
-    rivals |= {"base.saturation", "base.payload", "base.battery_sag", "base.accel_limit"}
-    found = search.search(problem_of([Fault(soft, {})], rivals, 2, 15.0), lambda _: None)
-    assert any(fit.ids == {"base.saturation"} and "inverse_w" in str(fit.start) for fit in found.likely)

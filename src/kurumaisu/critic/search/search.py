@@ -7,7 +7,6 @@ what two causes do together is no sum: the sets that they propose are fitted by 
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -23,8 +22,7 @@ from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior
 EffectSet = frozenset[Candidate]
 _WIDTH = 3  # sets that are gone on from in a round
 _NEAR = 8.0  # [nat] behind the best set within which one is gone on from
-_ADDED = 10  # proposals beside a set,
-_FORMS = 2  # of these, forms of one effect: all of them would crowd other effects out
+_ADDED = 8  # proposals beside a set, forms of one effect among them
 _BESIDE_CURVE = 2  # of these, what is proposed beside the best curve
 _SURELY = 4  # of those, tried however little they promise: what an equation misses is not in the promise
 _SWAPPED = 4  # and in the place of each of its effects
@@ -146,14 +144,11 @@ class _Search:
         return [*plain[: _ADDED - _BESIDE_CURVE], *beside[:_BESIDE_CURVE], *plain[_ADDED - _BESIDE_CURVE :]]
 
     def _priced(self, fit: Fit, guesses: Sequence[Guess]) -> list[Guess]:
-        """Return the best guess for a few forms of each effect, best first, with the prior of one more effect."""
+        """Return the best guess for each candidate, best first, with the prior of one more effect."""
         price = log_prior(len(fit.ids) + 1, self.of) - log_prior(len(fit.ids), self.of)
         first: dict[Candidate, Guess] = {}
-        forms: Counter[str] = Counter()
         for guess in sorted(guesses, key=lambda guess: -guess.nats):
-            if guess.candidate not in first and forms[guess.candidate.id] < _FORMS:
-                first[guess.candidate] = replace(guess, nats=guess.nats + price)
-                forms[guess.candidate.id] += 1
+            first.setdefault(guess.candidate, replace(guess, nats=guess.nats + price))
         return list(first.values())
 
     def _steps(self, fit: Fit) -> Iterator[Guess]:
