@@ -139,9 +139,7 @@ def _swallowed(axis, rate, p):
     width = p["width"] * (abs(slope / branch(axis, 1.0)[0]) if p["even"] >= 0.5 else 1.0)
     above = volts(axis, rate) - intercept
     left = abs(above) - width
-    if 0.25 <= p["whole"] < 0.75 and left <= 0:
-        return rate * abs(above) / width
-    return math.copysign(abs(above) if p["whole"] >= 0.25 else left, above) / slope if left > 0 else 0.0
+    return math.copysign(abs(above) if p["whole"] >= 0.5 else left, above) / slope if left > 0 else 0.0
 
 
 RATES["base.dead_zone_v"] = _each(lambda p, v, w: (_swallowed("translation", v, p), 0.0, w))

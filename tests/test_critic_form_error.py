@@ -135,14 +135,13 @@ def test_a_zone_with_a_soft_corner_is_a_dead_zone_and_nothing_else(seed):
 SOFT = {"base.saturation", "base.curvature_v"}  # a soft top speed bends the law, too
 LAWS = [
     ("v", lambda v: 0.8 * np.tanh(v / 0.8), SOFT),
-    ("v", lambda v: v * np.minimum(1.0, (v / 0.25) ** 2), {"base.dead_zone_v"}),
     ("w", lambda w: w * (1 - 0.2 * np.abs(w) ** 2.5), {"base.curvature_w"}),
 ]
 
 
 @pytest.mark.parametrize(("rate", "law", "right"), LAWS)
 def test_a_law_that_is_nobody_s_first_is_one_cause_still(rate, law, right):
-    """A top speed like a tanh, a zone that lets go little by little, a gain that falls late."""
+    """A top speed like a tanh, a gain that falls late."""
     fault = Fault(Form("events", lambda e, _: replace(e, **{rate: law(getattr(e, rate))})), {})
     rivals = {f"base.{kind}_{rate}" for kind in ("gain", "curvature", "dead_zone")} | {"base.saturation"}
     found = search.search(problem_of([fault], rivals, 2), lambda _: None)

@@ -111,7 +111,9 @@ def test_a_curve_and_effects_that_draw_the_same_are_fitted_no_worse_than_without
     """Whole steps overshoot together, from round to round."""
     bent = hidden.Kind(0, "v", lambda s, a, b: math.sin(9 * s.v) * abs(s.v))
     problem = hidden.problem_of(hidden.make(bent, 80.0, 1009, seconds=40.0, runs=2).recording)
-    both = problem.fit(["base.curvature_v", "base.dead_zone_v"], {})
+    parabola = next(one for one in problem.candidates if one.id == "base.curvature_v")
+    *_, zone = (one for one in problem.candidates if one.id == "base.dead_zone_v")
+    both = problem.fit_candidates([parabola, zone], {})
     (curve,) = (c for c in curves.Design(problem, both.settings).curves if c.id == "smooth.v.v")
     own, left = both.beside.own, both.beside.residual
     free = without(own, curves.columns(problem, both.settings, [curve]))

@@ -141,16 +141,6 @@ def test_a_dead_zone_of_rates_is_as_wide_on_either_side(whole, forward):
     np.testing.assert_allclose(out, [forward, -forward, 0.0, 0.0, beyond], atol=1e-12)
 
 
-def test_a_zone_that_lets_go_little_by_little_leaves_half_of_a_rate_in_its_middle():
-    zone = 0.06 / 1.32402
-    motion = effects.Motion(DT, zone * np.array([0.5, -0.5, 1.0, 2.0, 0.0]), np.zeros(5))
-    values = {"width": 0.06, "even": 1.0, "whole": 0.5}
-    out = effects.by_id("base.dead_zone_v")(values, context()).apply(motion).v
-    np.testing.assert_allclose(out, zone * np.array([0.25, -0.25, 1.0, 2.0, 0.0]), atol=1e-12)
-    narrower = effects.by_id("base.dead_zone_v")({**values, "width": -0.06}, context()).apply(motion).v
-    np.testing.assert_array_equal(narrower, motion.v)
-
-
 def test_process_noise_has_the_stated_size_and_colour():
     n, tau = 400_000, 0.3
     motion = effects.Motion(DT, np.full(n, 0.5), np.full(n, 0.1))

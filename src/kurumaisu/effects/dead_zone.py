@@ -10,7 +10,6 @@ from kurumaisu._core import AxisLaw
 from kurumaisu.effects.base import Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.types import FloatArray
 
-_NONE = 1e-12  # [m/s], [rad/s] a zone that is none
 _PARAMETERS = (
     Parameter("width", "V", null=0.0, scale=0.03, lower=-0.3, upper=0.5),
     Parameter("even", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
@@ -21,7 +20,6 @@ _FORMS = (
     {"even": 0.0, "whole": 0.0, "side": 0.0},
     {"even": 1.0, "whole": 0.0, "side": 0.0},
     {"even": 1.0, "whole": 1.0, "side": 0.0},
-    {"even": 1.0, "whole": 0.5, "side": 0.0},
     {"even": 0.0, "whole": 0.0, "side": 1.0},
     {"even": 0.0, "whole": 0.0, "side": -1.0},
 )
@@ -31,16 +29,13 @@ def _swallow(rate: FloatArray, values: Mapping[str, float], law: AxisLaw) -> Flo
     """Return rates without what the zone swallows; a negative width adds it.
 
     width [V]: of the branch of each rate, or with even = 1 of the positive one for both, so that as much of the rate
-    is lost on either side. whole: 1 where a rate beyond the zone is left as it is, 0.5 where one within it is
-    left, too, in proportion to how far it comes, as what sticks lets go little by little; else all rates are less by
-    the zone.
+    is lost on either side. whole: 1 where a rate beyond the zone is left as it is, else all rates are less by the zone.
     side: 1 where only positive rates have the zone, as each branch of the law has its own threshold, -1: negative ones.
     """
     branch = np.ones_like(rate) if values["even"] >= 0.5 else rate
     zone = values["width"] * np.abs(law.gain(branch)) * (np.round(values["side"]) * rate >= 0)
-    if values["whole"] >= 0.25:
-        inside = 0.0 if values["whole"] >= 0.75 else rate * np.abs(rate) / np.maximum(zone, _NONE)
-        return np.where(np.abs(rate) > zone, rate, inside)
+    if values["whole"] >= 0.5:
+        return np.where(np.abs(rate) > zone, rate, 0.0)
     return np.asarray(np.sign(rate) * np.maximum(np.abs(rate) - zone, 0.0))
 
 
@@ -55,7 +50,7 @@ class DeadZoneV(Effect):
     sentence = "small forward speeds that are asked for have no effect: their dead zone is wider than modelled"
     formula = (
         "sign(v) · max(0, |v| − width · |gain of V_f|), or with whole = 1: 0 up to there, beyond it v; "
-        "with whole = 0.5: v · |v| / (width · |gain|) up to there; with side = ±1: only forward (+1) or back (−1)"
+        "with side = ±1: only forward (+1) or back (−1)"
     )
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.V
@@ -77,7 +72,7 @@ class DeadZoneW(Effect):
     sentence = "small yaw rates that are asked for have no effect: their dead zone is wider than modelled"
     formula = (
         "sign(w) · max(0, |w| − width · |gain of V_s|), or with whole = 1: 0 up to there, beyond it w; "
-        "with whole = 0.5: w · |w| / (width · |gain|) up to there; with side = ±1: only to the left (+1) or right (−1)"
+        "with side = ±1: only to the left (+1) or right (−1)"
     )
     source = "assumed: joystick inputs have a neutral zone; 5-50 mV"
     shows_in = Rate.W
