@@ -67,14 +67,12 @@ class PassingObjects:
         core = _close(sights)
         if not core.any():
             return self
-        scans = np.flatnonzero(core.any(axis=1))
-        nearer = float(np.median((sights.expected - sights.measured)[core]))
-        place = np.median(sights.ends(sights.measured)[scans[0]][core[scans[0]]], axis=0)
-        readings = self.readings | _with_margin(core)
+        close = _objects(sights, core)
         if not len(self.scans):
-            return PassingObjects(readings, scans, nearer, place)
-        first = place if scans[0] < self.scans[0] else self.place
-        return replace(self, readings=readings, scans=np.union1d(self.scans, scans), place=first)
+            return close
+        place = close.place if close.scans[0] < self.scans[0] else self.place
+        scans = np.union1d(self.scans, close.scans)
+        return replace(self, readings=self.readings | close.readings, scans=scans, place=place)
 
     def unknowns(self) -> Iterator[Unknown]:
         """Yield what is outside the catalogue where so much is not in the map that the map is what is wrong."""
@@ -114,13 +112,15 @@ def passing_objects(sights: Sights) -> PassingObjects:
     core = _standing(sights, ends, nearer, off & (nearer > 0) & ~wide) | (seen & off)
     if core.sum() < _RARER * np.count_nonzero(off & (nearer < 0)) or not core.any():
         return PassingObjects(np.zeros_like(core), np.empty(0, dtype=np.int64), 0.0, np.zeros(2))
+    return _objects(sights, core)
+
+
+def _objects(sights: Sights, core: BoolArray) -> PassingObjects:
+    """Return what some readings (k, b), of things for sure, are of, with those beside them."""
     scans = np.flatnonzero(core.any(axis=1))
-    place = np.median(ends[scans[0]][core[scans[0]]], axis=0)
-    return PassingObjects(_with_margin(core), scans, float(np.median(nearer[core])), place)
-
-
-def _with_margin(core: BoolArray) -> BoolArray:
-    return np.asarray(binary_dilation(core, np.ones((1, 2 * _MARGIN + 1))))
+    place = np.median(sights.ends(sights.measured)[scans[0]][core[scans[0]]], axis=0)
+    nearer = float(np.median((sights.expected - sights.measured)[core]))
+    return PassingObjects(np.asarray(binary_dilation(core, np.ones((1, 2 * _MARGIN + 1)))), scans, nearer, place)
 
 
 def _close(sights: Sights) -> BoolArray:
