@@ -145,16 +145,22 @@ def _with(data, change):
     return replace(data, runs=(replace(run, scan=replace(run.scan, values=values)),))
 
 
+def walker(beams, nearer):
+    """Return what puts somebody before the walls in some scans, so many beams wide and so much [m] nearer."""
+
+    def change(values):
+        for k in range(5, 25):
+            met = slice(150 + 10 * k, 150 + beams + 10 * k)
+            values[k, met] = np.nanmin(values[k, met]) - nearer
+        return values
+
+    return change
+
+
 def test_somebody_who_walks_by_is_set_aside_and_is_not_taken_for_light_of_others(tmp_path):
     data = recording(tmp_path, "laser.mount_x", 0.05, 11, scans=30)
 
-    def walks(values):
-        for k in range(5, 25):
-            beams = slice(150 + 10 * k, 185 + 10 * k)
-            values[k, beams] = np.nanmin(values[k, beams]) - 0.5
-        return values
-
-    finding = criticise_scans(_with(data, walks), MODEL, lambda _: None)
+    finding = criticise_scans(_with(data, walker(35, 0.5)), MODEL, lambda _: None)
     assert not finding.unknown
     assert {cause.id for cause in finding.causes} == {"laser.mount_x"}
     assert any("not in the map stands before its walls" in line for line in finding.details)
@@ -164,13 +170,7 @@ def test_somebody_close_to_the_walls_is_set_aside_too(tmp_path):
     """Nearer to them than errors of the poses may move them, before scans have put these right."""
     data = recording(tmp_path, None, 0.0, 11, scans=30)
 
-    def walks(values):
-        for k in range(5, 25):
-            beams = slice(150 + 10 * k, 170 + 10 * k)
-            values[k, beams] = np.nanmin(values[k, beams]) - 0.13
-        return values
-
-    finding = criticise_scans(_with(data, walks), MODEL, lambda _: None)
+    finding = criticise_scans(_with(data, walker(20, 0.13)), MODEL, lambda _: None)
     assert not finding.causes
     assert not finding.unknown
     assert any("not in the map stands before its walls" in line for line in finding.details)
