@@ -180,10 +180,24 @@ def test_an_uncertain_effect_that_held_out_data_refuse_is_left_out():
 
 
 def test_what_is_certain_or_confirmed_is_kept():
-    certain = decision({"a": 1.0, "b": 0.95}, fit_of("a b", 50.0), fit_of("a", 45.0))
+    certain = decision({"a": 1.0, "b": 0.95}, fit_of("a b", 40.0), fit_of("a", 35.0))
     assert confirmed_part(certain, gain(-0.1), lambda _: gain(0.2)) == (certain, gain(-0.1))
     confirmed = decision({"a": 1.0, "b": 0.7}, fit_of("a b", 50.0), fit_of("a", 49.0))
     assert confirmed_part(confirmed, gain(0.2), lambda _: gain(0.3)) == (confirmed, gain(0.2))
+
+
+@pytest.mark.parametrize(
+    ("nats", "without", "left"),
+    [(60.0, {"a": 0.2, "b": 0.3}, {"b"}), (60.0, {"a": -0.1, "b": -0.2}, {"a", "b"}), (40.0, {"a": 0.2}, {"a", "b"})],
+)
+def test_what_is_beyond_doubt_is_not_hidden_by_one_that_held_out_data_refuse(nats, without, left):
+    """All effects are certain, and together they do not hold: the one goes without which most is gained."""
+    best = fit_of("a b", nats)
+    best.candidates, best.start = [SimpleNamespace(id=name) for name in "ab"], {}
+    made = decision({"a": 1.0, "b": 1.0}, best)
+    made.problem.fit_candidates = lambda some, _: fit_of(" ".join(one.id for one in some), nats - 5.0)
+    other, _ = confirmed_part(made, gain(-0.1), lambda one: gain(without[next(iter(one.found.best.ids))]))
+    assert other.found.best.ids == left
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 import pytest
-from hidden_effect import recording
+from hidden_effect import USUAL, make_run, recording, recording_of
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge import unresolved
@@ -47,3 +47,13 @@ def test_a_quarter_too_much_is_said_of_a_dozen_poses(monkeypatch, effect, size, 
     assert verdict.causes == ()
     assert verdict.verdict == ("none" if effect is None else "unknown")
     assert [one.covariate for one in verdict.unknown] == ([] if effect is None else [unresolved.COVARIATE])
+
+
+def test_what_acts_in_the_drives_to_fit_alone_is_not_green():
+    """Somebody mended the chair before the last drive: what the others show predicts that one worse."""
+    drives = [make_run("base.lag_v", size, seed, 60.0, USUAL) for seed, size in enumerate([0.5, 0.5, 0.001])]
+    data = replace(recording_of("mended", drives), train=("run_1", "run_2"), test=("run_3",))
+    criticism = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None)
+    assert criticism.verdict.verdict == "unknown"
+    assert [one.covariate for one in criticism.verdict.unknown] == [unresolved.COVARIATE]
+    assert "base.lag_v fits the drives, but does not predict held-out ones" in criticism.story.headline

@@ -60,6 +60,14 @@ def simulates_nearer(gain: Gain | None, channels: Sequence[str]) -> bool:
     return any(error.lo90 > 0 for error in known) and all(error.hi90 > 0 for error in known)
 
 
+def holds(gain: Gain | None, nats: float) -> bool:
+    """Return whether drives held out confirm effects with so much evidence.
+
+    What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
+    """
+    return confirmed(gain, nats) or (gain is not None and nats >= NO_NOISE and simulates_nearer(gain, [*gain.channels]))
+
+
 def matters(share: float, felt: float) -> bool:
     """Return whether an effect matters, by its share of the way and of the noise."""
     return share >= MATERIAL or (felt >= _FELT and share >= _LEAST)

@@ -12,14 +12,12 @@ import scipy
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
-from kurumaisu.critic.heldout.drive_gain import INCREMENT_CHANNELS
 from kurumaisu.critic.heldout.materiality import (
     NO_NOISE,
-    confirmed,
+    holds,
     matters,
     share_of_noise,
     share_of_way,
-    simulates_nearer,
 )
 from kurumaisu.critic.imu.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.judge import intervals, misfit, sentences
@@ -124,9 +122,7 @@ def _materiality(made: Decision, gain: Gain | None, *, turning: bool) -> tuple[b
     turning: only that was measured, by an imu, of which the scale is not known.
     """
     problem, best = made.problem, made.found.best
-    nats = made.found.nats(best)
-    # What is no noise by far, but other from drive to drive, brings surprises; then it must simulate them better.
-    held = confirmed(gain, nats) or (nats >= NO_NOISE and simulates_nearer(gain, tuple(INCREMENT_CHANNELS)))
+    held = holds(gain, made.found.nats(best))
     gains = made.found.enough and (held or made.untested)
     shares = shares_of(made, turning=turning)
     felt = {name: share_of_noise(problem, best.settings, without(best.settings, name)) for name in shares}

@@ -10,7 +10,7 @@ import numpy as np
 
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit
-from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed, expected_nats
+from kurumaisu.critic.heldout.materiality import CERTAIN, NO_NOISE, confirmed, expected_nats, holds
 from kurumaisu.critic.judge import explain_unknown
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.values.verdict import Gain
@@ -24,7 +24,8 @@ def confirmed_part(
 ) -> tuple[Decision, Gain | None]:
     """Return a decision with what it is worth, or that of what is confirmed in its place.
 
-    That is a smaller set which keeps what is named, or, for a curve of which nobody would be told, the catalogue's own.
+    That is a smaller set which keeps what is named, or one of all without one effect, where all together are beyond
+    doubt: one that is wrong must not hide the others. For a curve of which nobody would be told, the catalogue's own.
     """
     found = made.found
     if gain is None:
@@ -34,7 +35,7 @@ def confirmed_part(
         if told and not made.extension.fit.ids:
             return made, gain
         return _without_curves(made, gain, measure, gain.log_density_per_sample.gain if told else -np.inf)
-    if confirmed(gain, found.nats(found.best)):
+    if holds(gain, found.nats(found.best)):
         return made, gain
     smaller = [fit for fit in found.fits if fit.ids and set(found.named) <= fit.ids < found.best.ids]
     for fit in smaller[:_TRIED]:
@@ -42,7 +43,7 @@ def confirmed_part(
         gained = measure(other)
         if confirmed(gained, found.nats(fit)):
             return other, gained
-    return made, gain
+    return _without_one(made, gain, measure)
 
 
 def leave_one_out(made: Decision, held: Gain | None, measure: Callable[[], Gain]) -> Gain | None:
@@ -64,6 +65,21 @@ def untested(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool
     if held is None or not _unconfirmed(made, held) or held.log_density_per_sample.hi90 <= 0:
         return False
     return expected_nats(made.problem, drives, made.found.best.settings, ()) < _MET
+
+
+def _without_one(made: Decision, gain: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
+    """Return a decision without the one of its effects that leaves most, where that is confirmed beyond doubt."""
+    best = made.found.best
+    if len(best.ids) < 2 or made.found.nats(best) < NO_NOISE:
+        return made, gain
+    tried = []
+    for name in sorted(best.ids):
+        rest = [candidate for candidate in best.candidates if candidate.id != name]
+        other = _with_best(made, made.problem.fit_candidates(rest, best.start))
+        tried.append((other, measure(other)))
+    other, gained = max(tried, key=lambda one: one[1].log_density_per_sample.gain)
+    nats = made.found.nats(other.found.best)
+    return (other, gained) if nats >= NO_NOISE and confirmed(gained, nats) else (made, gain)
 
 
 def _unconfirmed(made: Decision, held: Gain) -> bool:

@@ -2,7 +2,8 @@
 """Something is surely wrong, and the data do not say what, or only when it was: amber, never green.
 
 Drives held out tell it: what was found, though nobody can name it, predicts them better; or the model leaves them
-farther off than the noise allows. Data too few to tell effects from noise do where any noise would make it likelier.
+farther off than the noise allows. So does what is beyond doubt in the drives to fit, though it predicts no others, and
+of data too few to tell effects from noise, what any noise would make likelier.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.heldout import drive_gain
-from kurumaisu.critic.heldout.materiality import CERTAIN, MATERIAL
+from kurumaisu.critic.heldout.materiality import CERTAIN, MATERIAL, NO_NOISE
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences
@@ -61,6 +62,11 @@ def with_unresolved(
     if not found.enough and _whatever_noise(found) >= _LEAST and share >= _FAR:
         few = f"{len(found.empty.beside.residual) // 3} intervals between poses are too few to say what it is"
         return _amber(criticism, shape, f"{begun}, however loud the noise; {few}. Nearest is {nearest}.")
+    if gain is not None and found.nats(found.best) >= NO_NOISE and share >= MATERIAL:
+        words = (
+            f"{begun}. {nearest} fits the drives, but does not predict held-out ones: it is not the whole explanation."
+        )
+        return _amber(criticism, shape, words)
     louder = least_variance(made.problem, held_out)
     if louder > _LOUDER:
         times = float(np.sqrt(louder))
