@@ -13,8 +13,8 @@ from kurumaisu import geometry
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base import drive, replay
 from kurumaisu.critic.data.reference import with_reference
+from kurumaisu.critic.heldout import materiality
 from kurumaisu.critic.heldout.materiality import simulates_nearer
-from kurumaisu.critic.judge import explain
 from kurumaisu.critic.values import prior
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.verdict import read_verdict
@@ -199,8 +199,10 @@ def test_without_poses_and_scans_the_odometry_is_what_commands_are_compared_with
 @pytest.mark.parametrize(("near", "verdict"), [(True, "named"), (False, "unknown")])
 def test_what_cannot_be_noise_is_named_where_it_simulates_nearer(monkeypatch, near, verdict):
     """Though the density of what is held out gains nothing, as where it differs from drive to drive; else amber."""
-    monkeypatch.setattr(explain, "confirmed", lambda worth, nats: False)
-    monkeypatch.setattr(explain, "simulates_nearer", lambda worth, channels: near and simulates_nearer(worth, channels))
+    monkeypatch.setattr(materiality, "confirmed", lambda worth, nats: False)
+    monkeypatch.setattr(
+        materiality, "simulates_nearer", lambda worth, channels: near and simulates_nearer(worth, channels)
+    )
     assert criticise(recording("base.gain_w", 0.1, 70, 40.0)).verdict.verdict == verdict
 
 
@@ -209,7 +211,7 @@ def test_a_recording_too_short_to_hold_anything_back_names_nothing():
     criticism = criticise(replace(data, runs=data.runs[:1], train=data.train[:1]))
     assert criticism.verdict.verdict == "none"
     assert criticism.verdict.gain is None
-    assert criticism.story.headline == "None of the 29 effects can be detected, because only 8.0 s were recorded."
+    assert criticism.story.headline == "None of the 29 effects can be named, because only 8.0 s were recorded."
 
 
 @pytest.mark.parametrize(

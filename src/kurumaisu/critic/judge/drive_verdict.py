@@ -75,7 +75,8 @@ def criticise_drives(
     judge = explain.criticism if made.extension is None else explain_unknown.criticism
     judged = excitation.with_shortcomings(judge(recording, made, held, train + test, proposal), made, train, scripts)
     shares = explain.shares_of(made, turning=recording.turning)
-    judged = unresolved.with_intermittent(unresolved.with_unresolved(judged, made, held, shares, test), going)
+    judged = unresolved.with_remainder(unresolved.with_unresolved(judged, made, held, shares, test))
+    judged = unresolved.with_intermittent(judged, going)
     found = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=found)
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))

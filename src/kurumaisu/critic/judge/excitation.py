@@ -42,7 +42,8 @@ def with_shortcomings(
     why = shortcomings(drives, enough=made.found.enough)
     listed = ", ".join(wanted[:_LISTED]) + (f" and {len(wanted) - _LISTED} more" if len(wanted) > _LISTED else "")
     some = f"None of the {len(ids)} effects can" if wanted == ids else f"{len(wanted)} of {len(ids)} effects cannot"
-    sentence, headline = f"{some} be detected in this recording: {listed}.", f"{some} be detected, because {why}."
+    verb = "detected" if made.found.enough else "named"
+    sentence, headline = f"{some} be {verb} by this recording: {listed}.", f"{some} be {verb}, because {why}."
     next_drive = criticism.story.next_drive
     if best is not None:
         next_drive = (

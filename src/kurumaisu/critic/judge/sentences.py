@@ -120,7 +120,8 @@ def _form(name: str, found: SearchResult) -> str:
 def _weight(name: str, found: SearchResult, shares: dict[str, float], matters: set[str]) -> str:
     if name not in matters:
         small = shares[name] < MATERIAL
-        return ": detectable, but too small to matter" if small else ": not confirmed on held-out data"
+        why = "not confirmed on held-out data" if found.enough else "too little was recorded to name it"
+        return ": detectable, but too small to matter" if small else f": {why}"
     if any(name in group for group in found.confounded):
         return ": a similar effect may act instead"
     return "" if found.p[name] >= NAMED else ": not certain enough to be named"

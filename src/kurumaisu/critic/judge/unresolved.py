@@ -37,6 +37,7 @@ _P = 0.5  # that any cause that could be told is it
 _LEAST = 5.0  # [nat] of evidence for what cannot be named
 _FAR = 0.02  # share of the way or turn that it moves the chair
 _LOUDER = 1.5  # times the variance that the noise has, beyond which drives held out are not understood
+_MISSED = 1.5  # times as far from where it came as noise alone would leave it, beyond which more must act
 _SURE = 0.99  # of the blocks drawn again
 _DRAWS = 500
 
@@ -76,6 +77,21 @@ def with_unresolved(
         )
         return _amber(criticism, f"held-out motion off {times:.1f} times as far as noise allows", words)
     return criticism
+
+
+def with_remainder(criticism: Criticism) -> Criticism:
+    """Return a criticism that says so where with all that was found held-out motion is far from what noise allows."""
+    gain, name = criticism.verdict.gain, f"position after {drive_gain.HORIZONS[0]:g} s"
+    said = criticism.verdict.verdict == "none" or any(one.covariate == COVARIATE for one in criticism.verdict.unknown)
+    path = None if said or gain is None else gain.rmse.get(name)
+    if path is None or path.achievable is None or path.extended < _MISSED * path.achievable:
+        return criticism
+    words = (
+        f"This is not the whole explanation: on held-out data the {name} is still off by {path.extended:.2g} m, where "
+        f"noise alone would make it {path.achievable:.2g} m."
+    )
+    story = criticism.story
+    return replace(criticism, story=replace(story, headline=f"{story.headline} {words}"))
 
 
 def certain_intermittent(made: Decision, drives: Sequence[Drive]) -> Intermittent | None:
