@@ -11,7 +11,7 @@ from kurumaisu.critic.search import search
 from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.bases import Basis, knots_of
-from kurumaisu.critic.unknown.periods import wave_period
+from kurumaisu.critic.unknown.periods import wave_periods
 from kurumaisu.effects import Motion
 
 GIRTH = 1.137  # [m]
@@ -31,7 +31,7 @@ def dented():
 
 def test_the_period_of_a_flat_spot_is_that_of_a_turn(dented):
     """Of the way as it was made: each overtone is as large, and out of step after some turns."""
-    found, _ = wave_period(dented, dented.fit(["base.gain_v"], {}).settings)
+    found, _ = wave_periods(dented, dented.fit(["base.gain_v"], {}).settings)["distance"]
     assert found == pytest.approx(GIRTH, rel=0.008)
 
 
@@ -42,6 +42,23 @@ def test_what_a_flat_spot_costs_on_the_mean_is_no_certain_gain_beside_its_waves(
     assert found.p_curves["smooth.v_gain.distance"] > 0.9
     assert found.p["base.gain_v"] < 0.9
     assert {one.curve.basis.harmonics for one in found.curves} >= {4, 12}
+
+
+@pytest.mark.parametrize(
+    ("covariate", "period", "channel", "error"),
+    [
+        ("x", 0.7, 2, lambda s, *_: s.v * math.sin(2 * math.pi * s.x / 0.7)),
+        ("time", 12.0, 2, lambda s, *_: math.sin(2 * math.pi * s.time / 12.0)),
+    ],
+)
+def test_tiles_and_people_who_sway_come_again_and_again(covariate, period, channel, error):
+    """Too often for a curve with few knots over the place or the time."""
+    made = hidden.make(hidden.Kind(channel, covariate, error), 40.0, 1023, seconds=60.0).recording
+    problem = hidden.problem_of(made)
+    best = CurveSearch(problem).beside(problem.fit_candidates((), {}))[0]
+    assert best.curve.basis.covariate == covariate
+    assert best.curve.basis.constants["period"] == pytest.approx(period, rel=0.03)
+    assert best.nats > 100
 
 
 @pytest.mark.parametrize("seed", [1021, 1022])

@@ -21,7 +21,7 @@ class CasterReversal(Effect):
 
     Its side, by `by`: 0 that of the last turn before the reversal, which is where the casters stand; 1 the same as long
     as the chair then drives forward, the other one backward, where it follows its casters; 2 always the same, as of one
-    caster that is stiff.
+    caster that is stiff; 3 the same, but the other one backward.
     """
 
     id = "base.caster_reversal"
@@ -29,14 +29,14 @@ class CasterReversal(Effect):
     parameters = (
         Parameter("kick", "rad/s", null=0.0, scale=0.1, lower=-2.0, upper=2.0),
         Parameter("length", "m", null=0.25, scale=0.25, lower=0.01, upper=5.0),
-        Parameter("by", "1", null=0.0, scale=1.0, lower=0.0, upper=2.0),
+        Parameter("by", "1", null=0.0, scale=1.0, lower=0.0, upper=3.0),
     )
-    forms = ({"by": 0.0}, {"by": 1.0}, {"by": 2.0})
+    forms = ({"by": 0.0}, {"by": 1.0}, {"by": 2.0}, {"by": 3.0})
     empirical = True
     sentence = "after a reversal the chair swings to one side until its casters have turned"
     formula = (
         "w ± kick · exp(−s / length) while driving; s: distance since the reversal, ±: side of the last turn; "
-        "by = 1: the other side in reverse, 2: always +"
+        "by = 1: the other side in reverse, 2: always +, 3: + forward, − in reverse"
     )
     source = "study of front casters in reverse, 2003: worst from 90°; 0.05-0.3 rad/s over 0.25 m"
     shows_in = Rate.W
@@ -63,7 +63,7 @@ class CasterReversal(Effect):
         kick = self.values["kick"] * np.exp(-(since + way / 2) / self.values["length"])
         self._direction, self._turns, self._side = float(direction[-1]), turns[-len(past) :], float(side[-1])
         self._travel = float(since[-1] + way[-1])
-        side = side * direction if round(self.values["by"]) == 1 else side
+        side = side * direction if round(self.values["by"]) in (1, 3) else side
         return replace(motion, w=motion.w + side * kick * (np.abs(motion.v) > RESTS))
 
     def settle(self, motion: Motion) -> None:
@@ -73,7 +73,7 @@ class CasterReversal(Effect):
 
     def _sides(self, w: FloatArray) -> FloatArray:
         """Return to which side turns put the casters, (n,), 0 where they leave them."""
-        return np.ones(len(w)) if round(self.values["by"]) == 2 else _signs(w, _TURNS)
+        return np.ones(len(w)) if round(self.values["by"]) in (2, 3) else _signs(w, _TURNS)
 
 
 def _signs(rates: FloatArray, least: float) -> FloatArray:

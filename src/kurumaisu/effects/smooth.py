@@ -62,8 +62,8 @@ _MOST = 64  # knots
 class _Curve(BaseEffect):
     """A curve over a covariate.
 
-    It is straight between knots and constant beyond the outer ones; over a periodic covariate it is a sum of a level,
-    sines and cosines.
+    It is straight between knots and constant beyond the outer ones; over a periodic covariate, or with a period over
+    another one, it is a sum of a level, sines and cosines.
     """
 
     parameters = ()
@@ -77,13 +77,13 @@ class _Curve(BaseEffect):
     @classmethod
     def check(cls, values: Mapping[str, float]) -> None:
         """Raise Error for a parameter that is missing, unknown or not finite, and for knots that do not increase."""
-        constant = constant_of(cls.covariate)
-        own = [constant] if constant else []
-        first, second = ("cos", "sin") if cls.covariate in PERIODIC else ("knot", "value")
-        start = 1 if cls.covariate in PERIODIC else 0
+        constant, periodic = constant_of(cls.covariate), _periodic(cls.covariate, values)
+        own = [constant] if constant else ["period"] if periodic else []
+        first, second = ("cos", "sin") if periodic else ("knot", "value")
+        start = 1 if periodic else 0
         count = sum(name.startswith(f"{first}_") for name in values)
         names = [f"{stem}_{i}" for stem in (first, second) for i in range(start, start + count)]
-        names += [*own, *(["level"] if cls.covariate in PERIODIC else [])]
+        names += [*own, *(["level"] if periodic else [])]
         if sorted(values) != sorted(names) or not 1 <= count <= _MOST:
             wanted = [*own, *(["level"] if start else []), f"{first}_{start}, ...", f"{second}_{start}, ..."]
             raise Error(f"{cls.id}: needs the parameters {', '.join(wanted)}; got {', '.join(values) or 'none'}")
@@ -185,11 +185,16 @@ def constant_of(covariate: str) -> str | None:
 
 def curve(covariate: str, values: Mapping[str, float], at: FloatArray) -> FloatArray:
     """Return the curve of parameters at values of the covariate, in the unit of the channel."""
-    if covariate not in PERIODIC:
+    if not _periodic(covariate, values):
         return np.asarray(np.interp(at, numbered(values, "knot", 0), numbered(values, "value", 0)))
     cosines, sines = numbered(values, "cos", 1), numbered(values, "sin", 1)
     phase = np.multiply.outer(2 * np.pi * at / values["period"], np.arange(1, len(cosines) + 1))
     return np.asarray(values["level"] + np.cos(phase) @ cosines + np.sin(phase) @ sines)
+
+
+def _periodic(covariate: str, values: Mapping[str, float]) -> bool:
+    """Tell whether a curve of parameters is periodic."""
+    return covariate in PERIODIC or "period" in values
 
 
 def numbered(values: Mapping[str, float], stem: str, start: int) -> FloatArray:

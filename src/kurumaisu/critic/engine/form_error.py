@@ -2,8 +2,9 @@
 """What the equation of a cause may miss, as a part of the noise: no real lag has one pole.
 
 A cause that acts adds a Gaussian process to the covariance: its signal times smooth functions of the rates, their
-changes, the time, the time since a command and the heading, and what the same cause would do with other sizes, as a
-soft corner or a second pole does. What its own sizes can do is left out of it, so that it moves no size.
+changes, the time, the time since a command, the way since a reversal and the heading, and what the same cause would do
+with other sizes, as a soft corner or a second pole does. What its own sizes can do is left out of it, so that it moves
+no size.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ _SIZES = (0.25, 0.5, 1.5, 2.0, 3.0)  # shares of a size whose signals stand for 
 _KNOTS = 5  # of a smooth function
 _CHANGE = 0.5  # [s] over which a change of the input is taken
 _LONG = 3.0  # [s] after a change from which on it is long ago
+_FAR = 1.0  # [m] after a reversal from which on it is far back
 _BENT = 0.05  # share of a column that must be left of it where sizes have taken theirs, else it is no other form
 
 
@@ -96,6 +98,11 @@ def smooth_functions(drive: Drive) -> FloatArray:
     changed = np.flatnonzero(np.append(True, (np.diff(drive.v) != 0) | (np.diff(drive.w) != 0)))
     at = np.clip(((since + until) / 2 - drive.start) / GRID, 0, len(drive.v) - 1).astype(int)
     last = changed[np.searchsorted(changed, at, side="right") - 1]
+    gone = np.concatenate([[0.0], np.cumsum(np.abs(drive.v)) * GRID])
+    way = np.sign(drive.v)
+    driven = np.flatnonzero(way)
+    turned = driven[1:][np.diff(way[driven]) != 0]
+    back = np.append(-_FAR, gone[turned])[np.searchsorted(turned, at, side="right")]
     quantities = [
         v,
         w,
@@ -103,6 +110,7 @@ def smooth_functions(drive: Drive) -> FloatArray:
         w - mean(drive.w, _CHANGE),
         since - since[0],
         np.minimum((at - last) * GRID, _LONG),
+        np.minimum(gone[at] - back, _FAR),
     ]
     hats = [_hats(values) for values in quantities]
     heading = drive.poses[:-1, 2]

@@ -103,14 +103,16 @@ class _Search:
         for _ in range(self._rounds):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
-            ahead = [
-                fit for fit in ranked[:_WIDTH] if fit.candidates not in self._done and self.score(fit) > best - _NEAR
-            ]
+            # What a curve draws beside nothing, two effects may do, of which neither comes near it by itself.
+            likeliest = max(ranked, key=self.bare)
+            near = [fit for fit in ranked[:_WIDTH] if self.score(fit) > best - _NEAR]
+            ahead = [fit for fit in [*near, likeliest] if fit.candidates not in self._done]
             if not ahead:
                 break
             for fit in ahead:
-                self._done.add(fit.candidates)
-                self._expand(fit)
+                if fit.candidates not in self._done:
+                    self._done.add(fit.candidates)
+                    self._expand(fit)
 
     def _expand(self, fit: Fit) -> None:
         best = max(self.bare(other) for other in self.fits.values())

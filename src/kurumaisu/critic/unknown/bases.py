@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,23 +89,23 @@ class Basis:
 
 
 def bases(
-    drives: Sequence[Drive], model: Model, settings: Sequence[EffectSetting], girth: tuple[float, int] | None
+    drives: Sequence[Drive], model: Model, settings: Sequence[EffectSetting], waves: Mapping[str, tuple[float, int]]
 ) -> Iterator[Basis]:
     """Yield the curves over every covariate that varies in these drives, as simulated with some effects.
 
-    girth: period of the distance travelled [m], and out of how many it was chosen; None where the way is too short.
+    waves: periods of covariates over which waves are looked for, and out of how many they were chosen.
     """
     motions = [replay.motion(drive, model, settings) for drive in drives]
     usual = {"x", "y", "heading", "v_f", "v_s", effects.LATE}
     extras = set.intersection(*(set(drive.known) for drive in drives)) - usual
     # Rows of odometry are no commands: the time since the last one says how the rows are spaced, and nothing else.
     measured = any(drive.source == "odom" for drive in drives)
-    for name in (*effects.COVARIATES, *sorted(extras)):
+    asked = [(name, _constants(name, drives, model), 1) for name in (*effects.COVARIATES, *sorted(extras))]
+    asked = [one for one in asked if one[0] != "distance"]
+    asked += [(name, {"period": period}, ways) for name, (period, ways) in waves.items()]
+    for name, constants, ways in asked:
         if measured and name == "since_command":
             continue
-        if name == "distance" and girth is None:
-            continue
-        constants = {"period": girth[0]} if name == "distance" and girth else _constants(name, drives, model)
         samples = [_samples(name, constants, motion) for motion in motions]
         pooled = np.concatenate([values[motion.moving] for values, motion in zip(samples, motions, strict=True)])
         known = pooled[np.isfinite(pooled)]
@@ -117,7 +117,6 @@ def bases(
             continue
         matrix = _matrix(knots, period, pooled, _HARMONICS)
         low, high = np.quantile(known, [0.025, 0.975])
-        ways = girth[1] if name == "distance" and girth else 1
         yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high), ways)
 
 

@@ -22,7 +22,7 @@ from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.unknown.bases import Basis, bases
 from kurumaisu.critic.unknown.offset import OFFSET_CHANNELS, constant_offset
-from kurumaisu.critic.unknown.periods import wave_period
+from kurumaisu.critic.unknown.periods import wave_periods
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -102,7 +102,7 @@ class Design:
         taken = {setting.id for setting in problem.model.effects}
         self.curves: list[Curve] = []
         at = 0
-        for basis in bases(problem.drives, problem.model, settings, wave_period(problem, settings)):
+        for basis in bases(problem.drives, problem.model, settings, wave_periods(problem, settings)):
             for channel in _channels(basis.covariate):
                 if effects.smooth_id(channel, basis.covariate) not in taken:
                     self.curves.append(Curve(channel, basis, slice(at, at + basis.size)))

@@ -1,68 +1,89 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The period of waves over the distance travelled, such as a wheel out of round makes: the one that explains most."""
+"""The period of waves that explain most: over the way, as of a wheel out of round, over the time, or over the place."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.base.sensitivity import Sensitivity
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
-_SHORTEST, _LONGEST = 0.3, 3.0  # [m] girths of casters and drive wheels, and more
-_TURNS = 3.0  # of the wheel in all drives, at least: fewer are a slope or a carpet
+
+@dataclass(frozen=True)
+class Wave:
+    """Waves over a covariate that are looked for: their shortest and longest, in its unit, and in which channels."""
+
+    shortest: float
+    longest: float
+    channels: tuple[str, ...]
+
+
+# Girths of casters and drive wheels, and more: a wheel out of round takes a share of the way, a bent caster turns the
+# chair. People who sway, pumps and fans; tiles, seams and ramps of a floor.
+WAVES: Mapping[str, Wave] = {
+    "distance": Wave(0.3, 3.0, ("v_gain", "w")),
+    "time": Wave(2.0, 60.0, ("v_gain", "w")),
+    "x": Wave(0.3, 3.0, ("v_gain", "curvature")),
+    "y": Wave(0.3, 3.0, ("v_gain", "curvature")),
+}
+_TURNS = 3.0  # in all of a drive, at least: fewer are a slope or a carpet
 _MOST = 150  # periods
-_WAVING = ("v_gain", "w")  # a wheel out of round takes a share of the way, a bent caster turns the chair
 _AT_ONCE = 16  # of them: more leave the processor's cache
 _OVERTONES = 4
 _PARTS = (1, 2, 3)  # of a turn, after which it may be as large as after all of it
 _CLOSER = 8  # periods for one about the best: an overtone is out of step sooner
 
 
-def wave_period(problem: Problem, settings: Sequence[EffectSetting]) -> tuple[float, int] | None:
-    """Return the period [m] of waves of either rate that explain most beside effects, and out of how many.
+def wave_periods(problem: Problem, settings: Sequence[EffectSetting]) -> dict[str, tuple[float, int]]:
+    """Return the period of waves over each covariate that explain most beside effects, and out of how many.
 
-    None where the drives are too short for any.
+    None of a covariate that no drive goes through often enough.
     """
     motions = [replay.motion(drive, problem.model, settings) for drive in problem.drives]
-    ways = [effects.Follower("distance", 0.0).values(motion) for motion in motions]
-    longest = max((float(way[-1]) for way in ways if len(way)), default=0.0)
-    if longest < _TURNS * _SHORTEST:
+    left = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
+    white = [problem.whitened(drive, one.reshape(-1, 1))[:, 0] for drive, one in zip(problem.drives, left, strict=True)]
+    sensitive = [Sensitivity(drive, motion) for drive, motion in zip(problem.drives, motions, strict=True)]
+    found = {}
+    for name, kind in WAVES.items():
+        along = [effects.Follower(name, 0.0).values(motion) for motion in motions]
+        sought = _PeriodSearch(problem, list(zip(problem.drives, sensitive, along, white, strict=True)))
+        period = _wave_period(sought, kind, max((float(np.ptp(one)) for one in along if len(one)), default=0.0))
+        if period is not None:
+            found[name] = period
+    return found
+
+
+def _wave_period(sought: _PeriodSearch, kind: Wave, longest: float) -> tuple[float, int] | None:
+    """Return the period that explains most, and out of how many; longest: as far as a drive goes."""
+    if longest < _TURNS * kind.shortest:
         return None
-    low, high = max(1 / _LONGEST, _TURNS / longest), 1 / _SHORTEST
+    low, high = max(1 / kind.longest, _TURNS / longest), 1 / kind.shortest
     waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
-    sought = _PeriodSearch(problem, settings, motions, ways)
-    gained = np.stack([sought.gained(channel, waves, 1) for channel in _WAVING])
+    gained = np.stack([sought.gained(channel, waves, 1) for channel in kind.channels])
     channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
     # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
     apart, closer = waves[1] - waves[0], np.arange(-_CLOSER, _CLOSER + 1) / _CLOSER
     near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
     near = [some[(some >= low) & (some <= high)] for some in near]
-    found = [(wave, sought.gained(_WAVING[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
+    found = [(wave, sought.gained(kind.channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
     likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
     return float(1 / likeliest), gained.size
 
 
 class _PeriodSearch:
-    """What is left about simulated drives, and what waves along their ways explain of it."""
+    """What is left about simulated drives, whitened, and what waves over a covariate explain of it."""
 
-    def __init__(
-        self,
-        problem: Problem,
-        settings: Sequence[EffectSetting],
-        motions: Sequence[effects.Motion],
-        ways: Sequence[FloatArray],
-    ) -> None:
-        self._problem = problem
-        self._drives = []
-        for drive, motion, way in zip(problem.drives, motions, ways, strict=True):
-            left = (drive.measured - problem.simulated(drive, settings)).reshape(-1, 1)
-            self._drives.append((drive, Sensitivity(drive, motion), way, problem.whitened(drive, left)[:, 0]))
+    def __init__(self, problem: Problem, drives: Sequence[tuple[Drive, Sensitivity, FloatArray, FloatArray]]) -> None:
+        """Take drives with how they react, the covariate, and what is left."""
+        self._problem, self._drives = problem, drives
 
     def gained(self, channel: str, waves: FloatArray, overtones: int) -> FloatArray:
         """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,)."""
