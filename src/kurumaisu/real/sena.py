@@ -33,7 +33,7 @@ def run(data: Path, output: Path, log: str = LOG) -> None:
         f"fastest {np.abs(drive.odom.column('v')).max():.2f} m/s"
     )
     heading = wall_headings(drive.scan.values, laser.angle_min + laser.angle_increment * np.arange(laser.beams))
-    print(_against_walls(heading, drive.odom.values[:, 2]))
+    print(against_walls(heading, drive.odom.values[:, 2]))
     criticise(path, output, "odometry against its own scans")
 
 
@@ -54,7 +54,7 @@ def wall_headings(ranges: FloatArray, angles: FloatArray) -> FloatArray:
     return out
 
 
-def _against_walls(walls: FloatArray, odom: FloatArray) -> str:
+def against_walls(walls: FloatArray, odom: FloatArray) -> str:
     """Return in words how the odometry's heading drifts against the walls."""
     quarter = np.pi / 2
     apart = odom - walls
@@ -65,8 +65,11 @@ def _against_walls(walls: FloatArray, odom: FloatArray) -> str:
     if abs(made) < np.pi:
         return f"walls against odometry: {np.degrees(made):+.0f} deg of turning are too little for it"
     steps = SIGMA_PER_MAD * float(np.median(np.abs(np.diff(drift))))
+    half = int(np.argmax(np.abs(odom[known] - odom[known[0]]) > abs(made) / 2))
+    middle = float(np.median(drift[half - 5 : half + 5]))
     return (
         f"heading of odometry less that of walls, {len(known)} scans: {np.degrees(last - first):+.1f} deg by the end, "
         f"while it says {np.degrees(made):+.0f} deg: turns are {1 - (last - first) / made:.3f} of what it says "
-        f"(one scan against the next: {np.degrees(steps):.1f} deg)"
+        f"({1 - 2 * (middle - first) / made:.2f} in its first half, {1 - 2 * (last - middle) / made:.2f} in its "
+        f"second; one scan against the next: {np.degrees(steps):.1f} deg)"
     )
