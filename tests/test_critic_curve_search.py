@@ -124,3 +124,14 @@ def test_a_chair_that_never_moves_follows_nothing():
     (drive,) = hidden.problem_of(case.null).drives
     resting = Problem([type(drive)(**{**vars(drive), "v": 0 * drive.v, "w": 0 * drive.w})], hidden.MODEL, hidden.USUAL)
     assert CurveSearch(resting).beside(nothing(resting)) == []
+
+
+def test_sets_are_sought_to_the_end_whatever_a_curve_beside_nothing_draws(monkeypatch):
+    """Of two effects that act on one rate neither comes near the curve that draws both."""
+    law = hidden.Kind(2, "v", lambda s, *_: -s.w * s.v**2)
+    made = hidden.make(law, 13.0, 31, seconds=60.0, gain_w=0.07).recording
+    problem = hidden.problem_of(made, frozenset({"base.gain_w", "base.understeer"}))
+    score = search._Search.score
+    monkeypatch.setattr(search._Search, "score", lambda self, fit: score(self, fit) + 1000.0 * (not fit.candidates))
+    found = search.search(problem, lambda _: None)
+    assert {"base.gain_w", "base.understeer"} in [fit.ids for fit in found.fits]
