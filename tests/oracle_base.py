@@ -284,11 +284,11 @@ def caster_reversal(p, drive):
             last_way = way
         travelled = abs(v) * drive.dt
         kick = p["kick"] * math.exp(-(since + travelled / 2) / p["length"]) if abs(v) > 1e-3 else 0.0
-        backwards = round(p["by"]) == 1 and last_way < 0
+        backwards = round(p["by"]) in (1, 3) and last_way < 0
         out.append(w - kicked_to * kick if backwards else w + kicked_to * kick)
         since += travelled
         turned = math.copysign(1.0, w) if abs(w) >= 0.05 else sides[-1]
-        sides = [*sides[1:], 1.0 if round(p["by"]) == 2 else turned]
+        sides = [*sides[1:], 1.0 if round(p["by"]) in (2, 3) else turned]
     return drive.v, _still(len(out)), out
 
 

@@ -197,7 +197,7 @@ def test_casters_kick_to_the_side_of_the_last_turn_and_die_away():
     assert not apply("base.caster_reversal", values, v, 0 * w).w.any()  # casters straight
 
 
-@pytest.mark.parametrize(("by", "sides"), [(0.0, (1, 1)), (1.0, (-1, 1)), (2.0, (1, 1))])
+@pytest.mark.parametrize(("by", "sides"), [(0.0, (1, 1)), (1.0, (-1, 1)), (2.0, (1, 1)), (3.0, (-1, 1))])
 def test_casters_kick_by_the_turn_by_the_way_or_always_to_one_side(by, sides):
     """Forward in a left turn, straight back, straight forward again; and the same with a right turn."""
     n = 100
@@ -205,7 +205,7 @@ def test_casters_kick_by_the_turn_by_the_way_or_always_to_one_side(by, sides):
     values = {"kick": 0.1, "length": 0.25, "by": by}
     for turn in (1, -1):
         kicks = apply("base.caster_reversal", values, v, turn * w).w - turn * w
-        expected = np.array(sides) * (1 if by == 2 else turn)
+        expected = np.array(sides) * (1 if by >= 2 else turn)
         assert not kicks[:n].any()
         np.testing.assert_array_equal(np.sign(kicks[n::n]), expected)
 

@@ -12,7 +12,7 @@ from kurumaisu.bench.hidden.generator.motion import Fault, Form
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import prepare
+from kurumaisu.critic.base.drive import GRID, prepare
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.covariance import orthonormal
 from kurumaisu.critic.engine.evidence import Problem
@@ -100,6 +100,19 @@ def test_smooth_functions_are_hats_that_cover_the_drive(problem):
     assert (hats[:, :-2] >= 0).all()
     np.testing.assert_allclose(hats[:, :-2].reshape(len(hats), -1, 5).sum(axis=2), 1.0, atol=1e-12)
     np.testing.assert_allclose((hats[:, -2:] ** 2).sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_a_form_may_follow_the_way_since_a_reversal(problem):
+    """Far from any before the first, at one just after it, and far again a metre on."""
+    drive = problem.drives[0]
+    half = len(drive.v) // 2
+    back = replace(drive, v=np.where(np.arange(len(drive.v)) < half, 0.5, -0.5))
+    since = back.times[:-1] - (back.start + half * GRID)
+    near, far = smooth_functions(back)[:, [-7, -3]].T
+    np.testing.assert_array_equal(far[since < -0.1], 1.0)
+    assert near[np.argmax(since > 0)] > 0.7
+    np.testing.assert_array_equal(far[since > 2.1], 1.0)
+    assert (near[since > 0.8] == 0).all()
 
 
 def bent(problem, setting, share):
