@@ -192,10 +192,9 @@ def test_what_is_certain_or_confirmed_is_kept():
 )
 def test_what_is_beyond_doubt_is_not_hidden_by_one_that_held_out_data_refuse(nats, without, left):
     """All effects are certain, and together they do not hold: the one goes without which most is gained."""
-    best = fit_of("a b", nats)
-    best.candidates, best.start = [SimpleNamespace(id=name) for name in "ab"], {}
-    made = decision({"a": 1.0, "b": 1.0}, best)
-    made.problem.fit_candidates = lambda some, _: fit_of(" ".join(one.id for one in some), nats - 5.0)
+    made = decision(
+        {"a": 1.0, "b": 1.0}, *(fit_of(names, nats - 5.0 * (len(names) < 2)) for names in ("a b", "a", "b"))
+    )
     other, _ = confirmed_part(made, gain(-0.1), lambda one: gain(without[next(iter(one.found.best.ids))]))
     assert other.found.best.ids == left
 

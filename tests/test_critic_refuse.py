@@ -53,7 +53,7 @@ def test_a_chair_that_was_never_asked_to_move_shows_nothing_and_is_told_what_to_
     assert found.verdict.next_experiment is not None
     assert len(found.verdict.next_experiment.separates) > 10
     assert found.verdict.next_experiment.id in found.story.next_drive
-    assert any("be detected by this recording: " in line for line in found.story.unexplained)
+    assert any("be detected in this recording: " in line for line in found.story.unexplained)
 
 
 def test_three_seconds_are_too_short():

@@ -54,6 +54,13 @@ def test_a_curve_multiplies_its_rate():
     np.testing.assert_allclose(apply("smooth.w_gain.v", HATS, Motion(DT, v, w)).w, w + w * over_v, atol=1e-15)
 
 
+def test_with_a_period_a_curve_over_the_time_comes_again_and_again():
+    v = np.full(400, 0.3)
+    moved = apply("smooth.v.time", WAVE | {"period": 2.5}, Motion(DT, v, 0 * v))
+    phase = 2 * np.pi * (np.arange(400) + 0.5) * DT / 2.5
+    np.testing.assert_allclose(moved.v - v, 0.01 + 0.02 * np.sin(phase) + 0.03 * np.cos(2 * phase), atol=1e-12)
+
+
 @pytest.mark.parametrize("turned", [0.0, 1.2])
 def test_a_curve_bends_what_a_reference_measures_along_the_axes_of_the_map(turned):
     """However the frame of the poses is turned in the map."""

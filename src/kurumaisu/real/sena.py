@@ -66,7 +66,7 @@ def against_walls(walls: FloatArray, odom: FloatArray) -> str:
         return f"walls against odometry: {np.degrees(made):+.0f} deg of turning are too little for it"
     steps = SIGMA_PER_MAD * float(np.median(np.abs(np.diff(drift))))
     half = int(np.argmax(np.abs(odom[known] - odom[known[0]]) > abs(made) / 2))
-    middle = float(np.median(drift[half - 5 : half + 5]))
+    middle = float(np.median(drift[max(half - 5, 0) : half + 5]))
     return (
         f"heading of odometry less that of walls, {len(known)} scans: {np.degrees(last - first):+.1f} deg by the end, "
         f"while it says {np.degrees(made):+.0f} deg: turns are {1 - (last - first) / made:.3f} of what it says "

@@ -98,11 +98,7 @@ def smooth_functions(drive: Drive) -> FloatArray:
     changed = np.flatnonzero(np.append(True, (np.diff(drive.v) != 0) | (np.diff(drive.w) != 0)))
     at = np.clip(((since + until) / 2 - drive.start) / GRID, 0, len(drive.v) - 1).astype(int)
     last = changed[np.searchsorted(changed, at, side="right") - 1]
-    gone = np.concatenate([[0.0], np.cumsum(np.abs(drive.v)) * GRID])
-    way = np.sign(drive.v)
-    driven = np.flatnonzero(way)
-    turned = driven[1:][np.diff(way[driven]) != 0]
-    back = np.append(-_FAR, gone[turned])[np.searchsorted(turned, at, side="right")]
+    reversed_ago = effects.Follower("since_reversal", 0.0).values(effects.Motion(GRID, drive.v, drive.w))
     quantities = [
         v,
         w,
@@ -110,7 +106,7 @@ def smooth_functions(drive: Drive) -> FloatArray:
         w - mean(drive.w, _CHANGE),
         since - since[0],
         np.minimum((at - last) * GRID, _LONG),
-        np.minimum(gone[at] - back, _FAR),
+        np.minimum(reversed_ago[at], _FAR),
     ]
     hats = [_hats(values) for values in quantities]
     heading = drive.poses[:-1, 2]

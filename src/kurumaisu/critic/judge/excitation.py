@@ -43,7 +43,7 @@ def with_shortcomings(
     listed = ", ".join(wanted[:_LISTED]) + (f" and {len(wanted) - _LISTED} more" if len(wanted) > _LISTED else "")
     some = f"None of the {len(ids)} effects can" if wanted == ids else f"{len(wanted)} of {len(ids)} effects cannot"
     verb = "detected" if made.found.enough else "named"
-    sentence, headline = f"{some} be {verb} by this recording: {listed}.", f"{some} be {verb}, because {why}."
+    sentence, headline = f"{some} be {verb} in this recording: {listed}.", f"{some} be {verb}, because {why}."
     next_drive = criticism.story.next_drive
     if best is not None:
         next_drive = (

@@ -12,13 +12,7 @@ import scipy
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.proposal import Proposal
-from kurumaisu.critic.heldout.materiality import (
-    NO_NOISE,
-    holds,
-    matters,
-    share_of_noise,
-    share_of_way,
-)
+from kurumaisu.critic.heldout.materiality import NO_NOISE, holds, matters, share_of_noise, share_of_way
 from kurumaisu.critic.imu.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision

@@ -69,17 +69,12 @@ def untested(made: Decision, held: Gain | None, drives: Sequence[Drive]) -> bool
 
 def _without_one(made: Decision, gain: Gain, measure: Callable[[Decision], Gain]) -> tuple[Decision, Gain]:
     """Return a decision without the one of its effects that leaves most, where that is confirmed beyond doubt."""
-    best = made.found.best
-    if len(best.ids) < 2 or made.found.nats(best) < NO_NOISE:
-        return made, gain
-    tried = []
-    for name in sorted(best.ids):
-        rest = [candidate for candidate in best.candidates if candidate.id != name]
-        other = _with_best(made, made.problem.fit_candidates(rest, best.start))
-        tried.append((other, measure(other)))
-    other, gained = max(tried, key=lambda one: one[1].log_density_per_sample.gain)
-    nats = made.found.nats(other.found.best)
-    return (other, gained) if nats >= NO_NOISE and confirmed(gained, nats) else (made, gain)
+    found, best = made.found, made.found.best
+    fewer = [fit for fit in found.fits if fit.ids and len(best.candidates - fit.candidates) == 1]
+    fewer = [fit for fit in fewer if fit.candidates < best.candidates and found.nats(fit) >= NO_NOISE]
+    tried = [(fit, measure(_with_best(made, fit))) for fit in fewer]
+    fit, gained = max(tried, key=lambda one: one[1].log_density_per_sample.gain, default=(best, gain))
+    return (_with_best(made, fit), gained) if confirmed(gained, found.nats(fit)) else (made, gain)
 
 
 def _unconfirmed(made: Decision, held: Gain) -> bool:

@@ -81,10 +81,12 @@ def with_unresolved(
 
 def with_remainder(criticism: Criticism) -> Criticism:
     """Return a criticism that says so where with all that was found held-out motion is far from what noise allows."""
-    gain, name = criticism.verdict.gain, f"position after {drive_gain.HORIZONS[0]:g} s"
+    gain = criticism.verdict.gain
     said = criticism.verdict.verdict == "none" or any(one.covariate == COVARIATE for one in criticism.verdict.unknown)
-    path = None if said or gain is None else gain.rmse.get(name)
-    if path is None or path.achievable is None or path.extended < _MISSED * path.achievable:
+    if said or gain is None or not gain.rmse:
+        return criticism
+    name, path = next(iter(gain.rmse.items()))  # over the shortest horizon
+    if path.achievable is None or path.extended < _MISSED * path.achievable:
         return criticism
     words = (
         f"This is not the whole explanation: on held-out data the {name} is still off by {path.extended:.2g} m, where "

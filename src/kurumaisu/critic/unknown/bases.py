@@ -100,8 +100,8 @@ def bases(
     extras = set.intersection(*(set(drive.known) for drive in drives)) - usual
     # Rows of odometry are no commands: the time since the last one says how the rows are spaced, and nothing else.
     measured = any(drive.source == "odom" for drive in drives)
-    asked = [(name, _constants(name, drives, model), 1) for name in (*effects.COVARIATES, *sorted(extras))]
-    asked = [one for one in asked if one[0] != "distance"]
+    plain = (name for name in (*effects.COVARIATES, *sorted(extras)) if name != "distance")  # that has waves alone
+    asked = [(name, _constants(name, drives, model), 1) for name in plain]
     asked += [(name, {"period": period}, ways) for name, (period, ways) in waves.items()]
     for name, constants, ways in asked:
         if measured and name == "since_command":
