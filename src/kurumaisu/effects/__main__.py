@@ -70,9 +70,9 @@ effects:
 
 Between knots, which must increase, the curve is straight; beyond the outer ones it is constant. There may be 1 to 64 of
 them, counted from 0. Over a periodic covariate, and over time, x and y where a `period` is given, the curve is
-level + Σ cos_k · cos(2πk · c / period) + sin_k · sin(...), counted from 1. A covariate in the table also needs the parameter in its row. Any other name is that of
-a quantity measured in a recording (a column of `covariate.csv`); the simulator does not know it and holds it at
-the parameter `now`, which the critic sets to its mean.
+level + Σ cos_k · cos(2πk · c / period) + sin_k · sin(...), counted from 1. A covariate in the table also needs the
+parameter in its row. Any other name is that of a quantity measured in a recording (a column of `covariate.csv`); the
+simulator does not know it and holds it at the parameter `now`, which the critic sets to its mean.
 
 `smooth.range.COVARIATE` adds such a curve, in metres, to the laser's readings, with the stage BIAS; all of them have
 knots. They follow `range` [m], `incidence`, `bearing`, `heading`, `world_bearing` [rad, within half a turn], `time` [s]
