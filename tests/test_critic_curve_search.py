@@ -31,7 +31,7 @@ def test_each_unknown_kind_is_found_where_it_is(name):
     found = CurveSearch(problem).beside(nothing(problem))
     assert found[0].curve.id == f"smooth.{kind.name}.{kind.covariate}"
     assert found[0].nats > 50
-    assert found[0].form_of is None
+    assert not found[0].form_of
     assert [one.nats for one in found] == sorted((one.nats for one in found), reverse=True)
 
 
@@ -92,7 +92,7 @@ SLOW = EffectSetting(  # forward, by a fifth, for a while half a minute after th
 def test_a_curve_over_time_beside_a_battery_that_sags_is_another_form_of_that():
     problem = driven_by(0, EffectSetting("base.battery_sag", {"sag": 0.004, "through": 1.0}), SLOW)
     beside = CurveSearch(problem).beside(problem.fit(["base.battery_sag"], {}))
-    assert {one.curve.id: one.form_of for one in beside}["smooth.v_gain.time"] == "base.battery_sag"
+    assert {one.curve.id: one.form_of for one in beside}["smooth.v_gain.time"] == {"base.battery_sag"}
     found = search.search(problem, lambda _: None)
     assert "base.battery_sag" in found.named
     assert found.p_curves.get("smooth.v_gain.time", 0.0) < 0.1  # nothing is outside the catalogue
@@ -102,7 +102,7 @@ def test_a_curve_over_time_beside_a_battery_that_sags_is_another_form_of_that():
 def test_a_curve_over_time_beside_a_lag_is_no_other_form_of_it(seed):
     problem = driven_by(seed, EffectSetting("base.lag_w", {"tau": 0.2}), SLOW)
     best = CurveSearch(problem).beside(problem.fit(["base.lag_w"], {}))[0]
-    assert (best.curve.id, best.form_of) == ("smooth.v_gain.time", None)
+    assert (best.curve.id, best.form_of) == ("smooth.v_gain.time", frozenset())
     assert best.nats > 50
 
 

@@ -29,7 +29,7 @@ def fit_of(score, *names):
     return SimpleNamespace(ids=chosen, candidates=chosen, score=score)
 
 
-def curve_of(nats, form_of=None, fit=None):
+def curve_of(nats, form_of=frozenset(), fit=None):
     return SimpleNamespace(fit=fit or fit_of(0.0), curve=SimpleNamespace(id="smooth.w.v"), nats=nats, form_of=form_of)
 
 
@@ -53,7 +53,7 @@ def test_a_curve_is_told_only_where_it_beats_the_catalogue(found_of):
 
 def test_a_curve_that_is_another_form_of_an_effect_is_no_news(found_of):
     """Nor is the next best one, which draws the same a little worse."""
-    assert decide.likelier_curve(found_of(20.0, curve_of(30.0, form_of="a"), curve_of(29.0))) is None
+    assert decide.likelier_curve(found_of(20.0, curve_of(30.0, form_of=frozenset({"a"})), curve_of(29.0))) is None
 
 
 def test_sets_that_were_near_are_weighed_again_in_another_noise(monkeypatch):

@@ -53,7 +53,7 @@ def test_a_curve_that_is_another_form_of_an_effect_is_told_as_no_unknown():
     problem = hidden.problem_of(hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording)
     empty = problem.fit_candidates((), {})
     first, *others = CurveSearch(problem).beside(empty)
-    other = next(replace(one, form_of="base.gain_w") for one in others if one.curve.id != first.curve.id)
+    other = next(replace(one, form_of=frozenset({"base.gain_w"})) for one in others if one.curve.id != first.curve.id)
     p = {first.curve.id: 0.9}
     found = SearchResult((empty,), (first, other), {"base.gain_w": 0.1}, p, ())
     assert [one.p for one in explain_unknown._unknowns(problem, found)] == [0.9]

@@ -151,7 +151,7 @@ def _hinted(problem: Problem, found: SearchResult, progress: Progress) -> Hint |
     curves = CurveSearch(easy)
     sets = {frozenset(): found.empty, found.best.candidates: found.best}
     fits = [easy.fit_candidates(chosen, fit.start if chosen else {}) for chosen, fit in sets.items()]
-    tried = [one for fit in fits for one in curves.beside(fit)[:1] if one.form_of is None]
+    tried = [one for fit in fits for one in curves.beside(fit)[:1] if not one.form_of]
     best = max(tried, key=found.log_posterior, default=None)
     bare = max(map(found.log_posterior, fits))
     return Hint(found, best) if best is not None and found.log_posterior(best) > bare + _HINT else None
@@ -181,7 +181,7 @@ def _density_with(problem: Problem, hint: Hint) -> float:
 def likelier_curve(found: SearchResult) -> SetWithCurve | None:
     """Return the best set with a curve, where that is likelier than all of the catalogue, in whatever form."""
     best = next(iter(found.curves), None)
-    if best is None or best.form_of is not None or not found.enough:
+    if best is None or best.form_of or not found.enough:
         return None
     return best if found.log_posterior(best) > found.log_posterior(found.best) else None
 

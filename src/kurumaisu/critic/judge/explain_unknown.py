@@ -223,7 +223,7 @@ def _unknowns(problem: Problem, found: SearchResult) -> Iterator[Unknown]:
     seen: set[str] = set()
     for rival in found.curves:
         if (
-            rival.form_of is not None
+            rival.form_of
             or rival.curve.id in seen
             or len(seen) == _LISTED
             or (seen and p[rival.curve.id] < _PLAUSIBLE)
@@ -242,7 +242,7 @@ def _rivals(made: Decision) -> Iterator[Alternative]:
     yield Alternative(" + ".join(sorted(found.best.ids)) or "no effect", -made.lead, "the best of the catalogue")
     seen = {best.curve.id}
     for rival in found.curves:
-        if rival.form_of is None and rival.curve.id not in seen and len(seen) <= _LISTED:
+        if not rival.form_of and rival.curve.id not in seen and len(seen) <= _LISTED:
             seen.add(rival.curve.id)
             beside = "".join(f" + {name}" for name in sorted(rival.fit.ids))
             name = f"{sentences.channel(rival.curve)} {sentences.followed(rival.curve)}{beside}"

@@ -110,7 +110,7 @@ def details(
 def _form(name: str, found: SearchResult) -> str:
     """Return that a cause is of another form than its equation, if that is likely."""
     drawn = any(
-        one.form_of == name for one in found.curves[:1] if found.log_posterior(one) > found.log_posterior(found.best)
+        name in one.form_of for one in found.curves[:1] if found.log_posterior(one) > found.log_posterior(found.best)
     )
     if not drawn and found.best.beside.forms.get(name, 0.0) < OTHER_FORM:
         return ""

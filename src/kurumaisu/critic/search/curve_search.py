@@ -36,14 +36,15 @@ _WORTH = -2.0  # [nat] below which a curve is not kept
 class SetWithCurve:
     """A set of effects with a curve beside it: by how many nats the data and the prior are for the curve.
 
-    form_of: the effect of the set that is itself such a curve, so that both together are another form of it.
+    form_of: the effects that it draws: one of the set, so that both together are another form of it, or some that the
+    set has not.
     """
 
     fit: Fit
     curve: Curve
     evidence: CurveEvidence
     nats: float
-    form_of: str | None = None
+    form_of: frozenset[str] = frozenset()
 
 
 class CurveSearch:
@@ -53,7 +54,7 @@ class CurveSearch:
         """Take drives, and the fit by which they are simulated, None: nothing."""
         self._problem, self._about = problem, () if about is None else about.settings
         self._found: dict[frozenset[Candidate], list[SetWithCurve]] = {}
-        self._moved: dict[tuple[frozenset[Candidate], str], FloatArray] = {}
+        self._moved: dict[tuple[frozenset[Candidate], frozenset[str]], FloatArray] = {}
 
     @cached_property
     def _design(self) -> Design | None:
@@ -118,54 +119,57 @@ class CurveSearch:
         kept = found[: max(_HINTS, sum(one.nats > _WORTH for one in found))]
         return [replace(one, form_of=self._form_of(fit, one.curve)) for one in kept]
 
-    def _form_of(self, fit: Fit, curve: Curve) -> str | None:
+    def _form_of(self, fit: Fit, curve: Curve) -> frozenset[str]:
         """Return the one effect of a set that is a curve over what a curve follows, if there is one.
 
         Either in the way or in the turns, and but for a level, which a gain has and every curve can have.
         """
         if not fit.ids:
-            return None
+            return frozenset()
         columns = self._columns(curve)
         level = orthonormal(columns[:, :1] if not len(curve.basis.knots) else columns.sum(axis=1, keepdims=True))
         span = orthonormal(without(level, columns))
-        shares = {name: max(_share(span, level, part) for part in self._signals(fit, name).T) for name in fit.ids}
+        signals = {name: self._signals(fit, frozenset({name})) for name in fit.ids}
+        shares = {name: max(_share(span, level, part) for part in both.T) for name, both in signals.items()}
         best = max(shares, key=lambda name: shares[name])
-        return best if shares[best] >= _DRAWN else None
+        return frozenset({best}) if shares[best] >= _DRAWN else frozenset()
 
     def as_form(self, one: SetWithCurve, more: Sequence[Fit]) -> SetWithCurve:
-        """Return a set with a curve, told as another form of an effect that the curve draws, if there is one.
+        """Return a set with a curve, told as another form of the effects that the curve draws, if there are any.
 
-        more: fits with one effect more than the set has.
+        more: fits with more effects than the set has; one effect goes before several, the first before the others.
         """
-        if one.form_of is not None:
+        if one.form_of:
             return one
         beside = one.fit.beside
         free, prior = without(beside.own, self._columns(one.curve)), one.evidence.prior
         drawn = free @ np.linalg.solve(np.eye(len(prior)) + prior @ (free.T @ free), prior @ (free.T @ beside.residual))
-        found: dict[str, float] = {}
-        for fit in more:  # an effect may be there in several forms
-            (name,) = fit.ids - one.fit.ids
-            signal = without(beside.own, self._signals(fit, name).sum(axis=1))
-            alike = float(drawn @ signal) / max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
-            found[name] = max(found.get(name, -1.0), alike)
-        best = max(found, key=lambda name: found[name], default=None)
-        return replace(one, form_of=best) if best is not None and found[best] >= _ALIKE else one
+        alike: list[tuple[frozenset[str], float]] = []
+        for fit in more:
+            ids = fit.ids - one.fit.ids
+            signal = without(beside.own, self._signals(fit, ids).sum(axis=1))
+            size = max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
+            alike.append((ids, float(drawn @ signal) / size))
+        best = max((each for each in alike if len(each[0]) == 1), key=lambda each: each[1], default=(frozenset(), 0.0))
+        several = [each for each in alike if len(each[0]) > 1]
+        found = next((ids for ids, share in (best, *several) if share >= _ALIKE), frozenset())
+        return replace(one, form_of=found)
 
-    def _signals(self, fit: Fit, name: str) -> FloatArray:
-        """Return what an effect of a fit does to the way, and to the turns, whitened, (rows, 2)."""
-        known = self._moved.get((fit.candidates, name))
+    def _signals(self, fit: Fit, names: frozenset[str]) -> FloatArray:
+        """Return what effects of a fit do to the way, and to the turns, whitened, (rows, 2)."""
+        known = self._moved.get((fit.candidates, names))
         if known is not None:
             return known
         terms = zip(fit.terms, fit.values, strict=True)
-        null = np.array([t.null if t.id == name and not t.shape else value for t, value in terms])
+        null = np.array([t.null if t.id in names and not t.shape else value for t, value in terms])
         parts = []
         for drive in self._problem.drives:
             here, there = (self._problem.simulated(drive, settings_of(fit.terms, at)) for at in (fit.values, null))
             axes = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
             moved = ((here - there)[:, :, None] * axes).reshape(-1, 2)
             parts.append(self._problem.whitened(drive, moved))
-        self._moved[fit.candidates, name] = np.concatenate(parts)
-        return self._moved[fit.candidates, name]
+        self._moved[fit.candidates, names] = np.concatenate(parts)
+        return self._moved[fit.candidates, names]
 
     def _evidences(
         self, design: Design, beside: Beside, pull: FloatArray, shares: Sequence[tuple[float, float]]

@@ -85,7 +85,7 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     total = logsumexp(np.concatenate([bare, curved]))
     weights, others = np.exp(bare - total), np.exp(curved - total)
     asked = (others > _SAID) | (curved > bare.max())
-    curves = [_told(one, fitted, search) if told else one for one, told in zip(found, asked, strict=True)]
+    curves = [_told(one, fits, len(names), search) if told else one for one, told in zip(found, asked, strict=True)]
     p = dict.fromkeys(names, 0.0)
     for ids, weight in _acting(fits, weights, curves, others):
         for name in ids:
@@ -93,7 +93,7 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     p = {name: min(each, 1.0) for name, each in p.items()}  # but for rounding
     p_curves: dict[str, float] = {}
     for one, weight in zip(curves, others, strict=True):
-        if one.form_of is None:
+        if not one.form_of:
             p_curves[one.curve.id] = p_curves.get(one.curve.id, 0.0) + float(weight)
     sets = SetPosterior(fits, np.exp(bare - logsumexp(bare)))
     enough = len(fitted[frozenset()].beside.residual) > _ENOUGH * len(problem.terms)
@@ -105,11 +105,16 @@ def _acting(
 ) -> list[tuple[frozenset[str], float]]:
     """Return which effects act, and how likely that is, for each set without and with a curve."""
     plain = [(fit.ids, float(w)) for fit, w in zip(fits, weights, strict=True)]
-    drawn = [frozenset() if one.form_of is None else frozenset({one.form_of}) for one in curves]
-    return plain + [(one.fit.ids | more, float(w)) for one, more, w in zip(curves, drawn, others, strict=True)]
+    return plain + [(one.fit.ids | one.form_of, float(w)) for one, w in zip(curves, others, strict=True)]
 
 
-def _told(one: SetWithCurve, fitted: Mapping[frozenset[Candidate], Fit], search: CurveSearch) -> SetWithCurve:
-    """Return a set with a curve, told as the form of an effect that it draws, if there is one."""
-    own = one.fit.candidates
-    return search.as_form(one, [fit for chosen, fit in fitted.items() if own < chosen and len(chosen - own) == 1])
+def _told(one: SetWithCurve, fits: Sequence[Fit], of: int, search: CurveSearch) -> SetWithCurve:
+    """Return a set with a curve, told as the form of the effects that it draws, if there are any.
+
+    fits: the likeliest first. Two effects can draw much: they must be nearly as likely as the curve.
+    """
+    own, least = one.fit.candidates, log_posterior(one.fit, of) + one.nats - _NEAR
+    more = [fit for fit in fits if own < fit.candidates]
+    return search.as_form(
+        one, [fit for fit in more if len(fit.candidates - own) == 1 or log_posterior(fit, of) > least]
+    )
