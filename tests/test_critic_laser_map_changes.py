@@ -9,8 +9,7 @@ from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.gathering import gather
-from kurumaisu.critic.ranges.scans.map_changes import map_change
-from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_objects
+from kurumaisu.critic.ranges.scans.map_changes import Sights, map_change, passing_objects
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 

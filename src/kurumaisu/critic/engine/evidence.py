@@ -14,7 +14,7 @@ from kurumaisu import effects
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.base.free_moments import free_columns
+from kurumaisu.critic.base.sensitivity import free_columns
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import (
     Candidate,
@@ -28,8 +28,7 @@ from kurumaisu.critic.engine.catalogue import (
 )
 from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
 from kurumaisu.critic.engine.form_error import SHARES, form_errors
-from kurumaisu.critic.engine.start_values import StartValues
-from kurumaisu.critic.engine.step_likelihood import StepLikelihood, Walked
+from kurumaisu.critic.engine.step_likelihood import StartValues, StepLikelihood, Walked
 from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
 from kurumaisu.critic.values.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model

@@ -18,8 +18,7 @@ from kurumaisu.critic.engine.evidence import Beside, Fit, Problem
 from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, Design, curve_evidences
 from kurumaisu.critic.unknown.curves import columns as columns_of
-from kurumaisu.critic.unknown.fine_curves import fine_curves
-from kurumaisu.critic.unknown.step_curves import gains_over_own_rate, step_curves
+from kurumaisu.critic.unknown.step_curves import fine_curves, gains_over_own_rate, step_curves
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 

@@ -23,6 +23,11 @@ _ROUNDING = 1e-6  # of a quantity's size: less spread is none
 _ORDERS = (1, 2)
 FINER = 4  # knots, or waves, for one
 _FINE = 3  # the same, of curves that the data may well bend so often
+OFFSET_CHANNELS = (
+    "v",
+    "lateral",
+    "w",
+)  # a share of a rate that is off by as much everywhere is a gain of the catalogue
 
 
 @dataclass(frozen=True)
@@ -187,3 +192,34 @@ def _walk(knots: FloatArray, order: int) -> FloatArray:
     s = (knots - knots[0]) / (knots[-1] - knots[0])
     low, high = np.minimum.outer(s, s), np.maximum.outer(s, s)
     return np.asarray(low if order == 1 else np.outer(s, s) + low**2 * (3 * high - low) / 6 * 4)
+
+
+@dataclass(frozen=True)
+class Offset(Basis):
+    """One number. What it is pictured over is the time, between low and high."""
+
+    @property
+    def size(self) -> int:
+        """Return the number of coefficients."""
+        return 1
+
+    def samples(self, motion: effects.Motion) -> FloatArray:
+        """Return the time since the start (n,) [s]."""
+        return effects.Follower("time", 0.0).values(motion)
+
+    def matrix(self, at: FloatArray) -> FloatArray:
+        """Return ones, (n, 1)."""
+        return np.ones((len(at), 1))
+
+    def finer(self, times: int = FINER) -> Basis:
+        """Return the same: a number has no knots between its knots."""
+        return self
+
+    def parameters(self, coefficients: FloatArray) -> dict[str, float]:
+        """Return the parameters as a model file has them."""
+        return {"knot_0": 0.0, "value_0": float(coefficients[0])}
+
+
+def constant_offset(seconds: float) -> Offset:
+    """Return the number, as known of drives of so many seconds."""
+    return Offset(effects.MOVING, np.empty(0), {}, (np.eye(1),), 0.0, seconds)

@@ -17,8 +17,7 @@ from scipy.stats import norm
 
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, FreeMoments
-from kurumaisu.critic.base.free_moments import hats
-from kurumaisu.critic.base.sensitivity import Sensitivity
+from kurumaisu.critic.base.sensitivity import Sensitivity, hats
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.values.story import Moments
 from kurumaisu.geometry import interpolate

@@ -9,8 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from kurumaisu.critic.unknown.bases import Basis
-from kurumaisu.critic.unknown.offset import Offset
+from kurumaisu.critic.unknown.bases import Basis, Offset
 from kurumaisu.critic.unknown.step_curves import StepCurve
 from kurumaisu.types import FloatArray
 

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.unknown.bases import FINER, Basis
-from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidences
+from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidence, curve_evidences
 from kurumaisu.types import FloatArray
 
 _PLACES = 24  # with as many samples between them
@@ -165,3 +165,19 @@ def _two_sided(gram: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]
     cross = both - beyond
     grams = np.array([[whole - 2 * both + beyond, cross], [cross, beyond]])
     return grams.transpose(2, 0, 1), np.column_stack([b[0] - b[1:], b[1:]])
+
+
+def fine_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, CurveEvidence]]:
+    """Yield, for each of the curves beside a fit that can bend, the one that does so more often, and its evidence."""
+    motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
+    fine = [(curve, curve.basis.fine(motions)) for curve in curves if curve.basis.size > 1]
+    finer = [replace(curve, basis=basis) for curve, basis in fine if basis is not None]
+    y = fit.beside.covariance.whiten(fit.beside.residual)
+    free = fit.beside.white(columns(problem, fit.settings, finer))
+    ends = np.cumsum([curve.basis.size for curve in finer])
+    for curve, end in zip(finer, ends, strict=True):
+        here = slice(end - curve.basis.size, end)
+        part = free[:, here]
+        found = curve_evidence(part.T @ part, part.T @ y, curve.basis.priors)
+        nats = found.nats - float(np.log(curve.basis.ways))
+        yield replace(curve, columns=slice(0, curve.basis.size)), replace(found, nats=nats)

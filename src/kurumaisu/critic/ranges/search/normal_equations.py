@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
 from kurumaisu.critic.ranges.noise.reading_noise import (
     OUTLIER,
     BeamNoise,
@@ -26,24 +25,32 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
 from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
     Layout,
+    OffsetProducts,
     ScanNoise,
     lasting_sds,
     marginal,
+    offset_products,
     own_pose_sds,
     pose_sds,
     whitened,
+    without_beam_offsets,
 )
-from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence, pose_evidence
-from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
+from kurumaisu.critic.ranges.poses.pose_corrections import (
+    MotionEvidence,
+    PoseEvidence,
+    motion_evidence,
+    pose_corrected,
+    pose_evidence,
+    stands_of,
+)
 from kurumaisu.critic.ranges.scans.beams import Shots, deviations, model_effects_with, moved_by_pose, some_scans
-from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
-from kurumaisu.critic.ranges.scans.map_changes import map_change
-from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_objects
-from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
+from kurumaisu.critic.ranges.scans.map_changes import Sights, blocked_beams, described, map_change, passing_objects
 from kurumaisu.critic.ranges.scans.valid_readings import (
     cut_off_ends,
+    grid_step,
     inside_ends,
     pose_weights,
+    unrounded,
     usable_beams,
     usable_readings,
     without_cut_off,
