@@ -17,7 +17,7 @@ from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _POINTS = 16  # of each increment: commands change once in it, seldom twice
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
@@ -233,18 +233,17 @@ def split(drive: Drive, parts: int) -> list[Drive]:
 
 def without_spans(drive: Drive, spans: Sequence[tuple[float, float]]) -> list[Drive]:
     """Return the drive without the increments that lie within spans of time [s]; each piece keeps all inputs."""
-    if not spans:
-        return [drive]
     since, until = drive.times[:-1], drive.times[1:]
-    held = np.any([(until > a) & (since < b) for a, b in spans], axis=0)
-    edges = np.concatenate([[-1], np.flatnonzero(held), [len(drive.times) - 1]])
-    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
+    return _without(drive, np.any([(until > a) & (since < b) for a, b in spans], axis=0)) if spans else [drive]
 
 
 def pieces(drive: Drive, gap: float) -> list[Drive]:
     """Return the drive without the increments that are longer than a gap [s]; each piece keeps all inputs."""
-    long = np.flatnonzero(np.diff(drive.times) > gap)
-    edges = np.concatenate([[-1], long, [len(drive.times) - 1]])
+    return _without(drive, np.diff(drive.times) > gap)
+
+
+def _without(drive: Drive, out: BoolArray) -> list[Drive]:
+    edges = np.concatenate([[-1], np.flatnonzero(out), [len(drive.times) - 1]])
     return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
 
 

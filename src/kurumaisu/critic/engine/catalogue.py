@@ -133,18 +133,18 @@ def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
                 yield replace(term, step=0.2, shape=True)
 
 
-def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> tuple[Term, ...]:
-    """Return the terms, marked where another step does not do its share of the same; moved: the change by settings."""
-    return tuple(term if term.shape else _marked(term, moved) for term in terms)
-
-
-def _marked(term: Term, moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> Term:
-    p = term.parameter
-    steps = np.clip(term.null + np.array([0.5, 1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
-    half, one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
-    norms = float(np.linalg.norm(one) * np.linalg.norm(two))
-    rough = norms > 0 and float(one @ two) < _STRAIGHT * norms
-    return replace(term, rough=rough, sudden=float(np.linalg.norm(half)) < _SUDDEN * float(np.linalg.norm(one)))
+def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> Iterator[Term]:
+    """Yield the terms, marked where another step does not do its share of the same; moved: the change by settings."""
+    for term in terms:
+        if term.shape:
+            yield term
+            continue
+        p = term.parameter
+        steps = np.clip(term.null + np.array([0.5, 1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
+        half, one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
+        norms = float(np.linalg.norm(one) * np.linalg.norm(two))
+        sudden = float(np.linalg.norm(half)) < _SUDDEN * float(np.linalg.norm(one))
+        yield replace(term, rough=norms > 0 and float(one @ two) < _STRAIGHT * norms, sudden=sudden)
 
 
 def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:

@@ -8,10 +8,10 @@ times, it tells what any change would explain.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -25,6 +25,9 @@ from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.effects import Motion
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
+
+if TYPE_CHECKING:
+    from kurumaisu.critic.engine.evidence import Problem
 
 _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
@@ -71,7 +74,6 @@ class StepLikelihood:
         self._model, self._walked = model, walked
         share = max(_TOTAL / len(drives), _LEAST)
         self._drives = [_begin(drive, share) for drive in drives[: int(_TOTAL / share)]]
-        self.share = sum(len(drive.times) for drive in drives) / sum(len(drive.times) for drive in self._drives)
         self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
         for drive, plain in zip(self._drives, self._plain, strict=True):
@@ -255,28 +257,16 @@ def _alike(one: FloatArray, other: FloatArray) -> float:
     return float(one @ other) / (norms[0] * norms[1]) if norms[0] > _FAINT * norms[1] else 0.0
 
 
-class LinearByDrive(least_squares.Linearised, Protocol):
-    """What can be fitted, drive by drive."""
-
-    def residuals(self, terms: Sequence[Term], values: FloatArray) -> list[FloatArray]:
-        """Return the whitened residual of each drive."""
-
-
 class StartValues:
     """First values; of what is rough, by the likelihood of what every size would explain."""
 
-    def __init__(self, problem: LinearByDrive, likelihood: Callable[[], StepLikelihood]) -> None:
-        """Take what is fitted; likelihood: makes that of its drives, where something is rough."""
-        self._problem, self._make = problem, likelihood
+    def __init__(self, problem: Problem, walked: Walked) -> None:
+        """Take what is fitted; walked: what sizes have been found to do, whatever the noise."""
+        self._problem, self._walked = problem, walked
 
     @cached_property
     def _likelihood(self) -> StepLikelihood:
-        return self._make()
-
-    @property
-    def share(self) -> float:
-        """Return how many times longer the drives are than what the likelihood sees of them."""
-        return self._likelihood.share
+        return StepLikelihood(self._problem.drives, self._problem.model, self._problem.noise, self._walked)
 
     def first(self, terms: Sequence[Term], start: Mapping[Key, float]) -> FloatArray:
         """Return first values: those given; for others, one after the other, the best of some steps from null."""
@@ -312,13 +302,6 @@ class StartValues:
                 break
             solution = again
         return solution
-
-    def with_best_step(self, terms: Sequence[Term], values: FloatArray, rough: str) -> dict[Key, float]:
-        """Return values with the best peak of one of the effects, seen beside the rest."""
-        for i, term in enumerate(terms):
-            if term.id == rough and term.rough:
-                values = self._best(terms, np.where(np.arange(len(values)) == i, term.null, values), i)
-        return {term.key: float(value) for term, value in zip(terms, values, strict=True)}
 
     def step_evidence(self, rough: Sequence[Term], terms: Sequence[Term], values: FloatArray) -> float:
         """Return what the best peak of an effect with rough terms explains beside others, by lines, in nats."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 from scipy.linalg import qr
@@ -276,7 +276,9 @@ class NoiseResiduals:
     def growth(self, about: NoiseEstimate, prior_odds: float) -> NoiseGrowth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
         growing = min(
-            (self._best(start, names) for start, names in self._growing(about.noise)), key=_cost_of, default=about
+            (self._best(start, names) for start, names in self._growing(about.noise)),
+            key=attrgetter("cost"),
+            default=about,
         )
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
@@ -348,10 +350,6 @@ def _searched(noise: Noise) -> tuple[str, ...]:
 def _growing_noise(noise: Noise, growth: float) -> Noise:
     """Return noise that grows, and is about as large as before at usual rates."""
     return replace(noise, growth=growth, **{name: getattr(noise, name) / (1 + growth) for name in _GROWING})
-
-
-def _cost_of(estimate: NoiseEstimate) -> float:
-    return estimate.cost
 
 
 def _independent(columns: FloatArray) -> FloatArray:

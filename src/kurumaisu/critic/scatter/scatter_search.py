@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 from scipy.special import logsumexp
@@ -49,12 +49,7 @@ class ScatterEffect:
     rivals: Mapping[str, float]
 
 
-def _cost(fitted: tuple[list[ScatterPiece], float]) -> float:
-    return fitted[1]
-
-
-def _nats(piece: ScatterPiece) -> float:
-    return piece.nats
+_cost, _nats = itemgetter(1), attrgetter("nats")  # of what was fitted; of a piece
 
 
 def _without_piece(pieces: Sequence[ScatterPiece], one: ScatterPiece) -> list[ScatterPiece]:

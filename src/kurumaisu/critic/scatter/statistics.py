@@ -118,7 +118,8 @@ class Statistics:
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
         said = readings[self._trust]
-        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
+        piled = _counts(readings[self._read])[[0, -1]].tolist()
+        values = [_log(np.count_nonzero(_counts(said))), *map(_root, piled)]
         return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(places)])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
@@ -144,7 +145,9 @@ class Statistics:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([one.count for one in self._told()])
         places = np.arange(len(counts)) >= len(counts) - _PLACES
-        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds(), self._alike())
+        folds = self._groups.folds
+        folds = np.asarray(np.r_[folds, np.zeros(len(counts) - len(folds))])
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), folds, self._alike())
 
     def _alike(self) -> FloatArray:
         """Return correlations of the numbers (m, m): one reading that is missing is so in all groups it belongs to."""
@@ -155,11 +158,6 @@ class Statistics:
         out = np.eye(len(told))
         out[np.ix_(counts, counts)] = masks @ masks.T
         return out
-
-    def _folds(self) -> FloatArray:
-        """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
-        known = self._groups.folds
-        return np.asarray(np.r_[known, np.zeros(len(self._told()) - len(known))])
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
@@ -288,12 +286,10 @@ def _trends(told: Sequence[Statistic], kinds: Sequence[str]) -> FloatArray:
 
 def _cells(assembly: Assembly) -> IntArray:
     """Return the cell of the map (k, b) in which each beam ends, numbered."""
-    origins, bearings = assembly.origins()
-    angle = origins[:, :, 2] + bearings
-    ranges = np.nan_to_num(assembly.marks.seen.level, posinf=0.0)
-    ends = origins[:, :, :2] + ranges[:, :, np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    seen = assembly.marks.seen
+    ends = seen.ends(np.nan_to_num(seen.level, posinf=0.0))
     _, index = np.unique(np.floor(ends / _CELL).reshape(-1, 2), axis=0, return_inverse=True)
-    return np.asarray(index.reshape(ranges.shape))
+    return np.asarray(index.reshape(seen.level.shape))
 
 
 def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
@@ -324,12 +320,6 @@ def _counts(readings: FloatArray) -> IntArray:
     """Return how many readings have each value, from the least to the greatest."""
     steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
     return np.bincount(steps - steps.min()) if len(steps) else np.zeros(1, dtype=np.int64)
-
-
-def _least_and_greatest(readings: FloatArray) -> tuple[float, float]:
-    """Return how many readings have the least and the greatest value, as roots of counts."""
-    counts = _counts(readings)
-    return _root(int(counts[0])), _root(int(counts[-1]))
 
 
 def _spacing(readings: FloatArray) -> float:

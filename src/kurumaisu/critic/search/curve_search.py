@@ -16,6 +16,7 @@ from kurumaisu.critic.engine.catalogue import Candidate, settings_of
 from kurumaisu.critic.engine.covariance import orthonormal, without
 from kurumaisu.critic.engine.evidence import Beside, Fit, Problem
 from kurumaisu.critic.engine.form_error import SHARES
+from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, Design, curve_evidences
 from kurumaisu.critic.unknown.curves import columns as columns_of
 from kurumaisu.critic.unknown.step_curves import fine_curves, gains_over_own_rate, step_curves
@@ -62,10 +63,7 @@ class CurveSearch:
 
     def columns(self, fit: Fit, one: SetWithCurve) -> FloatArray:
         """Return whitened columns (rows, k) whose normal shares are a curve before the data."""
-        values, vectors = np.linalg.eigh(one.evidence.prior)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        free = self._columns(one.curve)
-        return np.asarray((free - fit.beside.own @ (fit.beside.own.T @ free)) @ root)
+        return np.asarray(without(fit.beside.own, self._columns(one.curve)) @ root_of(one.evidence.prior))
 
     def _columns(self, curve: Curve) -> FloatArray:
         """Return the whitened columns of a curve, (rows, k)."""

@@ -19,7 +19,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, edges_of
 from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset
+from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset, root_of
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -29,33 +29,10 @@ _SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, 
 _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
 # What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again, and so would
 # how the way bends over the speed.
+_OVER = ("v_times_w", "time", "since_command", "since_rest", "since_reversal", "heading", "distance", "x", "y")
 _BRAKES = {
-    "v_gain": (
-        "w",
-        "abs_w",
-        "v_times_w",
-        "time",
-        "since_command",
-        "since_rest",
-        "since_reversal",
-        "heading",
-        "distance",
-        "x",
-        "y",
-    ),
-    "w_gain": (
-        "v",
-        "abs_v",
-        "v_times_w",
-        "time",
-        "since_command",
-        "since_rest",
-        "since_reversal",
-        "heading",
-        "distance",
-        "x",
-        "y",
-    ),
+    "v_gain": ("w", "abs_w", *_OVER),
+    "w_gain": ("v", "abs_v", *_OVER),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
     "speed": ("time", "heading", "x", "y"),
 }
@@ -177,8 +154,7 @@ def _axes(gram: FloatArray, priors: Sequence[FloatArray] | FloatArray) -> tuple[
     """
     scaled = np.stack(list(priors))
     scaled = scaled / np.maximum(np.sum(gram * scaled, axis=(1, 2)), 1e-12)[:, None, None]
-    values, vectors = np.linalg.eigh(scaled)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    root = root_of(scaled)
     sizes, turns = np.linalg.eigh(root.transpose(0, 2, 1) @ gram @ root)
     return scaled, root @ turns, np.maximum(sizes, 0.0)
 

@@ -189,24 +189,12 @@ def _moves(pose: Series, end: int, seconds: float) -> float:
 def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Laser:
     """Return the model's laser, mounted and fanned as the recording says."""
     if mount is not None:
-        place = Mount(mount.x, mount.y, laser.mount.z, mount.yaw)
-        laser = replace(
-            laser,
-            mount=place,
-            angle_min=mount.angle_min,
-            angle_increment=mount.angle_increment,
-            beams=mount.beams,
-            time_increment=laser.time_increment if mount.time_increment is None else mount.time_increment,
-        )
-    known = next((run.fan for run in runs if run.fan is not None), None)
-    if known is not None:
-        laser = replace(
-            laser,
-            angle_min=known.angle_min,
-            angle_increment=known.angle_increment,
-            beams=known.beams,
-            time_increment=known.time_increment,
-        )
+        laser = replace(laser, mount=Mount(mount.x, mount.y, laser.mount.z, mount.yaw))
+    for fan in (mount, next((run.fan for run in runs if run.fan is not None), None)):
+        if fan is not None:
+            increment = laser.time_increment if fan.time_increment is None else fan.time_increment
+            known = {name: getattr(fan, name) for name in ("angle_min", "angle_increment", "beams")}
+            laser = replace(laser, **known, time_increment=increment)
     return laser
 
 

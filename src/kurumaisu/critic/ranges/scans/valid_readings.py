@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kurumaisu import geometry
-from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
+from kurumaisu import effects, geometry
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, stated_beams
 from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -68,7 +68,7 @@ def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 
 def _edges_between(shots: Shots, seen: BeamHits, reach: float) -> BoolArray:
     """Return the same as edges of a fan whose beams are too far apart to tell what is beside each of them."""
     rays, origins = Rays(shots.walls), seen.origins.reshape(-1, 3)
-    bearings = np.concatenate([each.bearings for each in seen.beams])
+    bearings = seen.bearings.ravel()
     with np.errstate(divide="ignore", invalid="ignore"):
         aside = _BESIDE + reach / np.nan_to_num(seen.level.ravel(), posinf=np.inf)
         right, near, left = (1 / rays.cast(origins, bearings + side * aside)[0] for side in (-1.0, 0.0, 1.0))
@@ -169,7 +169,7 @@ class PoseWeights:
 def pose_weights(shots: Shots, scan: int) -> PoseWeights:
     """Return on which reference poses a scan rests: those around the times at which its beams leave by the model."""
     track = shots.tracks[shots.run[scan]]
-    times = firing_times(shots, scan)
+    times = effects.build_laser(shots.own, np.random.default_rng(0)).aim(stated_beams(shots, scan)).times
     last = len(track.times) - 1
     first = min(max(int(np.searchsorted(track.times, times.min(), side="right")) - 1, 0), last)
     rows = slice(first, min(max(int(np.searchsorted(track.times, times.max())), first), last) + 1)

@@ -101,7 +101,7 @@ class Assembly:
         somewhere = without_cut_off(shots.measured, ends)
         # Where readings of the map's own walls are cut off, only what stands before them is left.
         kept = np.where(inside_ends(self.marks.base, ends), self.marks.base, np.nan)
-        self.map_change = map_change(somewhere, kept, self.hits(), self.marks.seen.incidence)
+        self.map_change = map_change(somewhere, kept, self.marks.seen.ends(self.marks.base), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
@@ -148,17 +148,10 @@ class Assembly:
         known = {each.covariate for each in staying}
         return [*riding, *staying, *(each for each in self.passing_objects.unknowns() if each.covariate not in known)]
 
-    def hits(self) -> FloatArray:
-        """Return where (k, b, 2) [m] the beams meet the map."""
-        poses, bearings = self.origins()
-        angles = poses[:, :, 2] + bearings
-        way = self.marks.base[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        return np.asarray(poses[:, :, :2] + way)
-
     def _seen_by(self, readings: FloatArray) -> Sights:
         """Return what readings (k, b) [m] see, from where the scans are taken to be."""
         middle = readings.shape[1] // 2
-        return Sights(readings, self.marks.base, self.shots.laser.bearings, self.origins()[0][:, middle])
+        return Sights(readings, self.marks.base, self.shots.laser.bearings, self.marks.seen.origins[:, middle])
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
@@ -412,11 +405,6 @@ class Assembly:
             return np.concatenate([[noise.common_sd], pose_sds(noise)])
         own = np.tile(own_pose_sds(noise), self.hats[k].weights.shape[1])
         return np.concatenate([[noise.common_sd], lasting_sds(noise), own])
-
-    def origins(self) -> tuple[FloatArray, FloatArray]:
-        """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
-        seen = self.marks.seen
-        return seen.origins, np.array([each.bearings for each in seen.beams])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

@@ -119,9 +119,8 @@ def _drawn(shots: Shots, marks: EffectColumns, ids: frozenset[str] | None) -> It
 def _moved(shots: Shots, segments: FloatArray, marks: EffectColumns) -> FloatArray:
     """Return how much farther level beams (k, b) go [m] before other walls; 0 where they meet another one."""
     seen = marks.seen
-    bearings = np.array([each.bearings for each in seen.beams])
     rays = Rays(replace(shots.walls, segments=segments))
-    ranges = rays.ranges(seen.origins.reshape(-1, 3), bearings.ravel()).reshape(seen.level.shape)
+    ranges = rays.ranges(seen.origins.reshape(-1, 3), seen.bearings.ravel()).reshape(seen.level.shape)
     with np.errstate(invalid="ignore"):
         change = ranges - seen.level
     return np.where(np.isfinite(change) & (np.abs(change) < 0.1), change, 0.0)

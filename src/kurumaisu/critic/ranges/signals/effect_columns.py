@@ -68,28 +68,17 @@ class EffectColumns:
 
     def __init__(self, shots: Shots) -> None:
         self._shots = shots
-        self._seen = hits_of(shots, (), 0)
+        self.seen = hits_of(shots, (), 0)
         self._own = {setting.id: setting.parameters for setting in shots.own}
-        self.base = predict(shots, (), self._seen, 0)
+        self.base = predict(shots, (), self.seen, 0)
         self._halves: dict[tuple[str, str], bool] = {}
         self._probe = EffectColumns(thin(shots, _PROBE)) if len(shots.stamps) > _PROBE else self
 
-    @property
-    def seen(self) -> BeamHits:
-        """What the beams meet by the model."""
-        return self._seen
-
     def thinned(self, rows: IntArray) -> EffectColumns:
         """Return some of the scans alone."""
-        out, seen = copy(self), self._seen
-        out._seen = BeamHits(
-            seen.ranges[rows],
-            seen.level[rows],
-            seen.incidence[rows],
-            seen.returns[rows],
-            tuple(seen.beams[row] for row in rows.tolist()),
-            seen.origins[rows],
-        )
+        out, seen = copy(self), self.seen
+        parts = {name: getattr(seen, name)[rows] for name in ("ranges", "level", "incidence", "returns", "origins")}
+        out.seen = BeamHits(beams=tuple(seen.beams[row] for row in rows.tolist()), **parts)
         out.base = self.base[rows]
         return out
 
@@ -97,12 +86,12 @@ class EffectColumns:
         """Return the change (k, b) [m] of the mean by an effect with values in place of the model's."""
         setting = EffectSetting(effect.id, {**self.null(effect), **values})
         moved = effect.id not in self._own and issubclass(effect, effects.ReadingEffect)
-        seen = self._seen if moved else hits_of(self._shots, (setting,), seed, like=self._seen)
+        seen = self.seen if moved else hits_of(self._shots, (setting,), seed, like=self.seen)
         return np.asarray(predict(self._shots, (setting,), seen, seed) - self.base)
 
     def together(self, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the change (k, b) [m] of the mean by effects with these values in place of the model's."""
-        seen = hits_of(self._shots, settings, 0, like=self._seen)
+        seen = hits_of(self._shots, settings, 0, like=self.seen)
         return np.asarray(predict(self._shots, settings, seen, 0) - self.base)
 
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
