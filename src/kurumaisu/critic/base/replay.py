@@ -141,15 +141,10 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     start = 0.0 if started is None else float(started[0])
     times = start + GRID * np.arange(len(poses))
     curved = any(isinstance(effect, effects.SmoothReference) for effect in chair.effects.reference)
-    known = _at_edges(motion) if curved else {}
+    known = {**motion.known, "v": motion.v, "w": motion.w} if curved else {}
+    known = {name: edges_of(values) for name, values in known.items()}
     measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
     return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
-
-
-def _at_edges(motion: effects.Motion) -> dict[str, FloatArray]:
-    """Return what is known of a motion's steps (n,), and its rates, at their edges, (n + 1,) each."""
-    own = {**motion.known, "v": motion.v, "w": motion.w}
-    return {name: edges_of(values) for name, values in own.items()}
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:

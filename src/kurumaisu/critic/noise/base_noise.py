@@ -224,7 +224,9 @@ class NoiseResiduals:
         gram = np.zeros(2 * (count + _PARTS * drives,))
         for i, (drive, columns) in enumerate(zip(self._drives, self._stacked, strict=True)):
             here = np.r_[:count, count + _PARTS * i : count + _PARTS * (i + 1)]
-            parts = most * turned(drive) * _parts(drive)
+            rows = len(drive.measured)
+            part = np.eye(_PARTS)[np.arange(rows) * _PARTS // max(rows, 1)]  # in which each row lies
+            parts = most * turned(drive) * np.repeat(part, 3, axis=0)
             gram[np.ix_(here, here)] += whitener(drive, noise).gram(np.column_stack([columns, parts]))
         free = np.zeros((len(gram), count - 1 + drives))  # effects, and each drive as a whole
         free[1:count, : count - 1] = np.eye(count - 1)
@@ -236,7 +238,10 @@ class NoiseResiduals:
         likelihood = 0.5 * np.sum(pulls * within / (1 + within * sizes) - np.log1p(within * sizes), axis=1)
         likely = within[likelihood > likelihood.max() - 0.5].max()
         length = float(np.median([drive.times[-1] - drive.times[0] for drive in self._drives]))
-        return most * min(float(np.sqrt(likely * _between(length))), 1.0)
+        # How much more what wanders varies between drives than within them, as a variance.
+        share = max(length, 1e-3) / _SLOWEST
+        mean = 2 / share * (1 - (1 - np.exp(-share)) / share)
+        return most * min(float(np.sqrt(likely * float(mean / (1 - mean)))), 1.0)
 
     def _as_known(self, noise: Noise) -> Noise:
         """Return noise with all errors of the reference as large as they are known to be, if they are."""
@@ -325,20 +330,6 @@ def turned(drive: Drive) -> FloatArray:
     """Return what a turn of all headings by 1 rad changes of the measured increments, (3 m, 1)."""
     dx, dy, _ = drive.measured.T
     return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
-
-
-def _parts(drive: Drive) -> FloatArray:
-    """Return in which part of a drive each row lies, (3 m, parts) of 0 and 1."""
-    rows = len(drive.measured)
-    part = np.arange(rows) * _PARTS // max(rows, 1)
-    return np.repeat(np.eye(_PARTS)[part], 3, axis=0)
-
-
-def _between(length: float) -> float:
-    """Return how much more what wanders varies between drives of a length [s] than within them, as a variance."""
-    share = max(length, 1e-3) / _SLOWEST
-    mean = 2 / share * (1 - (1 - np.exp(-share)) / share)
-    return float(mean / (1 - mean))
 
 
 def _searched(noise: Noise) -> tuple[str, ...]:

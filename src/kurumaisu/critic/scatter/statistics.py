@@ -12,13 +12,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import (
-    GATE,
-    PILED,
-    cut_offs,
-    inside_ends,
-    without_cut_off,
-)
+from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_offs, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest

@@ -106,14 +106,6 @@ def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) 
     return np.asarray(out)
 
 
-def marginal(grams: Sequence[Gram], layout: Layout, noise: ScanNoise) -> tuple[FloatArray, float]:
-    """Return the normal equations of the columns common to all, scans' errors integrated out, and a log determinant.
-
-    The latter is that of the covariance, relative to independent readings.
-    """
-    return Stacked(grams, layout).marginal(noise)
-
-
 class Stacked:
     """Grams in a few large arrays, for noises to be tried on."""
 
@@ -129,7 +121,10 @@ class Stacked:
         ]
 
     def marginal(self, noise: ScanNoise) -> tuple[FloatArray, float]:
-        """Return what marginal does."""
+        """Return the normal equations of what all scans have, their own errors integrated out, and a log determinant.
+
+        The latter is that of the covariance, relative to independent readings.
+        """
         band, prior_log_det = precision(self._layout, noise)
         cross, total, log_det = np.zeros((band.shape[1], self._common)), np.zeros((self._common, self._common)), 0.0
         for part in self._parts:
@@ -287,7 +282,7 @@ def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: flo
 def without_beam_offsets(
     grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
-    """Return normal equations as shared_errors.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
+    """Return normal equations as Stacked.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
 
     All grams share as many errors with others.
     """

@@ -44,6 +44,9 @@ _TRIES = 40
 _LEFT = 0.5  # share of the readings of straight walls that are away from edges of stairs, below which too few are left
 _ROUGHER = 1.1  # times as far as readings scatter about the others, up to which nobody can say which walls they are of
 _SEARCHED = np.array([0.003, 0.003, 0.001])  # [m, rad] of them about what was fitted, 1 sd, at first
+_COARSER = 1.3  # times the model's angle between beams, from which they may have been thinned out
+_LATER = 0.01  # [s] by which all beams are fired later, to see what a delay does
+_NEAR = 0.1  # [m] beyond which a reading is of another wall
 
 
 def why_not_usable(recording: Recording) -> str | None:
@@ -287,18 +290,13 @@ def with_likelier_walls(shots: Shots) -> Shots:
     return replace(shots, walls=replace(shots.walls.drawn, stairs=bool(left.sum() < _LEFT * met.sum())))
 
 
-def _doubt(shots: Shots) -> FloatArray:
-    """Return what the poses of each scan (k, 3) [m, rad] err, 1 sd."""
-    return np.array([track.doubt for track in shots.tracks])[shots.run][:, [0, 0, 1]]
-
-
 def _fitted(shots: Shots) -> FloatArray:
     """Return by how much the poses (k, b, 3) [m, rad] of all beams are to be moved to where the readings put them.
 
     Over a scan they may be off as they would be at another rate.
     """
     place = np.zeros_like(shots.shift)
-    doubt = np.tile(_doubt(shots), 2)
+    doubt = np.tile(np.array([track.doubt for track in shots.tracks])[shots.run][:, [0, 0, 1]], 2)  # of poses, 1 sd
     during = np.linspace(-1.0, 1.0, shots.laser.beams)[:, np.newaxis]
     moves = moved_by_pose(shots, hits_of(shots, (), 0))
     moves = np.concatenate([moves, moves * during], axis=2)
@@ -340,3 +338,42 @@ def _least_scatter(shots: Shots, place: FloatArray, met: BoolArray) -> float:
         better = scatter < least
         least, best = np.where(better, scatter, least), np.where(better[:, np.newaxis, np.newaxis], tried, best)
     return float(np.sqrt(least.sum() / max(met.sum(), 1)))
+
+
+def with_sweep_time(recording: Recording, model: Model) -> Recording:
+    """Return a recording whose laser has the time between its beams [s]: of the model's, or as much more as its angle.
+
+    As it is where the recording says it, or nothing tells; of both, what the readings are nearer to, beside a delay.
+    """
+    laser, usual = recording.laser, model.laser
+    if laser is None or laser.time_increment is not None or why_not_usable(recording) is not None:
+        return recording
+    coarser = abs(laser.angle_increment / usual.angle_increment)
+    if coarser < _COARSER or usual.time_increment <= 0 or any(run.fan is not None for run in recording.runs):
+        return recording
+    shots = gather(recording, model)
+    turned = _share_of_turn(shots, coarser)
+    increment = usual.time_increment * (coarser if turned > 1 / 2 else 1.0)
+    return replace(recording, laser=replace(laser, time_increment=increment))
+
+
+def _share_of_turn(shots: Shots, coarser: float) -> float:
+    """Return which share of what more time between beams would do to the readings is in them.
+
+    Beside what a delay does, and a clock that runs fast or slow.
+    """
+    left = shots.measured - _readings(shots, shots.said)
+    even = replace(shots, tracks=tuple(map(smoothed, shots.tracks)))
+    now = _readings(even, shots.said)
+    slower, later = (_readings(even, said) - now for said in (coarser * shots.said, shots.said + _LATER))
+    since = (shots.stamps / max(float(np.abs(shots.stamps).max()), 1.0))[:, np.newaxis]
+    with np.errstate(invalid="ignore"):
+        use = (np.abs(left) < _NEAR) & (np.abs(slower) < _NEAR) & (np.abs(later) < _NEAR)
+    columns = np.stack([slower[use], later[use], (since * later)[use]], axis=1)
+    return float(np.linalg.lstsq(columns, left[use], rcond=None)[0][0]) if use.any() else 0.0
+
+
+def _readings(shots: Shots, said: FloatArray) -> FloatArray:
+    """Return what the model reads (k, b) [m] with beams fired at other times (b,) [s] after the stamp."""
+    moved = replace(shots, said=said)
+    return predict(moved, (), hits_of(moved, (), 0), 0)

@@ -143,7 +143,10 @@ def with_dominant(
     """
     again = next((each for each in rest.causes if each.id == lead.id), None)
     others = tuple(one for one in rest.pictures.misfits if one.explained_by != lead.id)
-    if again is not None and _nothing(again):
+    nulls = {p.name: p.null for p in effects.by_id(lead.id).parameters}
+    sizes = {} if again is None else {name: one for name, one in again.parameters.items() if one.hi90 > one.lo90}
+    # Nothing may be left of it, by all of its intervals.
+    if sizes and all(one.lo90 <= nulls[name] <= one.hi90 for name, one in sizes.items()):
         return replace(
             rest,
             causes=tuple(each for each in rest.causes if each is not again),
@@ -163,10 +166,3 @@ def with_dominant(
         settings=rest.settings if moved else (lead, *rest.settings),
         pictures=replace(rest.pictures, misfits=(*shown, *others)),
     )
-
-
-def _nothing(cause: Cause) -> bool:
-    """Tell whether nothing may be left of an effect, by all of its intervals."""
-    nulls = {p.name: p.null for p in effects.by_id(cause.id).parameters}
-    sizes = {name: one for name, one in cause.parameters.items() if one.hi90 > one.lo90}
-    return bool(sizes) and all(one.lo90 <= nulls[name] <= one.hi90 for name, one in sizes.items())

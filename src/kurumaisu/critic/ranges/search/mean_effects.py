@@ -59,17 +59,6 @@ class FurtherEffects:
     found: FormPosterior
     groups: Groups
 
-    def added_to(self, fit: FittedForms) -> FittedForms:
-        """Return a fit with what acts beside it."""
-        more = self.found.best
-        return FittedForms(
-            (*fit.forms, *more.forms),
-            np.concatenate([fit.coefficients, more.coefficients]),
-            np.concatenate([fit.sds, more.sds]),
-            fit.log_likelihood + more.log_likelihood,
-            fit.score + more.score,
-        )
-
 
 def further_effects(
     assembly: Assembly,
@@ -94,7 +83,9 @@ def further_effects(
     beams = refitted.normal.beam_noise
     beams = replace(beams, valid=beams.valid & normal.beam_noise.valid)
     refitted = replace(refitted, normal=replace(normal, beam_noise=beams))
-    curves = _curves(assembly, fit, others)
+    # Curves that effects of the fit may follow instead, and what these effects do (k, b) [m].
+    parts = [(others[form.id], form, size) for form, size in fit.parts() if form.id in others]
+    curves = [(curve, assembly.columns[:, :, form.span] @ size) for curve, form, size in parts]
     gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)
     starts = np.cumsum([0, *(len(form.columns) for form in rest)])
     moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
@@ -114,20 +105,11 @@ def _key(form: Form) -> tuple[object, ...]:
 
 def _promising(found: FormPosterior, fit: FittedForms) -> bool:
     """Return whether one more effect would be likelier if no share of what is there were asked of it."""
-    return any(_unasked(one) > _unasked(fit) for one in found.fits if one.ids > fit.ids)
 
+    def unasked(one: FittedForms) -> float:
+        return one.score + LINE_ERROR * max(len(one.forms) - 1, 0) * one.log_likelihood
 
-def _unasked(fit: FittedForms) -> float:
-    return fit.score + LINE_ERROR * max(len(fit.forms) - 1, 0) * fit.log_likelihood
-
-
-def _curves(
-    assembly: Assembly, fit: FittedForms, others: Mapping[str, FormFamily]
-) -> list[tuple[FormFamily, FloatArray]]:
-    """Return the curves that effects of a fit may follow instead, and what these effects do (k, b) [m]."""
-    return [
-        (others[form.id], assembly.columns[:, :, form.span] @ size) for form, size in fit.parts() if form.id in others
-    ]
+    return any(unasked(one) > unasked(fit) for one in found.fits if one.ids > fit.ids)
 
 
 def _gram(
@@ -217,7 +199,14 @@ class MeanEffects:
 
     def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
         """Return the same with what acts beside it."""
-        fit = more.added_to(self.fit)
+        one, other = self.fit, more.found.best
+        fit = FittedForms(
+            (*one.forms, *other.forms),
+            np.concatenate([one.coefficients, other.coefficients]),
+            np.concatenate([one.sds, other.sds]),
+            one.log_likelihood + other.log_likelihood,
+            one.score + other.score,
+        )
         return replace(self, fit=fit, others=form_families(assembly, normal, [fit]), more=more)
 
     def parts(self) -> list[Part]:
