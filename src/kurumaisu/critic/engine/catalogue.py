@@ -180,7 +180,9 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
     own = {setting.id for setting in model.effects}
     for effect in effects.of_base(voltages=model.robot.voltages):
         if effect.choices and effect.id not in own:
-            found += _choices(effect) if ids is None or effect.id in ids else []
+            for choice in effect.choices if ids is None or effect.id in ids else ():
+                fixed = tuple(_fixed(effect.id, parameter, choice) for parameter in effect.parameters)
+                found.append(Candidate(effect.id, fixed, len(effect.choices)))
             continue
         amplitudes = [term for term in terms if term.id == effect.id and not term.shape]
         shapes = [term for term in terms if term.id == effect.id and term.shape]
@@ -210,12 +212,6 @@ def _forms(
         fixed = tuple(_fixed(effect.id, parameter, form) for parameter in effect.parameters if parameter.name in form)
         usual = _USUAL if len(forms) > 1 else 1.0
         yield fixed, (len(forms) - 1) / (1 - usual) if i else 1 / usual, i == 0
-
-
-def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:
-    for choice in effect.choices:
-        terms = tuple(_fixed(effect.id, parameter, choice) for parameter in effect.parameters)
-        yield Candidate(effect.id, terms, len(effect.choices))
 
 
 def _fixed(name: str, parameter: Parameter, values: Mapping[str, float]) -> Term:

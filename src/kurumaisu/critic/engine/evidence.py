@@ -251,7 +251,8 @@ class Problem:
     def _beside(self, terms: Sequence[Term], solution: least_squares.Solution) -> Beside:
         own = orthonormal(solution.slopes)
         blocks = {name: Covariance(some) for name, some in form_errors(self, terms, solution.values, own).items()}
-        missed = _together(len(own), list(blocks.values()))
+        many = [np.empty((len(own), 0)), *(one.columns for one in blocks.values())]
+        missed = next(iter(blocks.values())) if len(blocks) == 1 else Covariance(np.column_stack(many))
         left = without(own, solution.residual)
         gains = [missed.scaled(share).gain(left) for share in SHARES]
         best = SHARES[int(np.argmax(gains))]
@@ -343,13 +344,6 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
-
-
-def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:
-    """Return the noise of several causes whose equations miss something."""
-    if len(blocks) == 1:
-        return blocks[0]
-    return Covariance(np.column_stack([np.empty((rows, 0)), *(one.columns for one in blocks)]))
 
 
 def _alike(slopes: FloatArray) -> float:

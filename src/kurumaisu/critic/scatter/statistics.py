@@ -96,7 +96,7 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        ends, places = self._ends(readings)
+        ends, (low, high) = self._ends(readings)
         left, common = self._leftover(error, ends)
         inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
@@ -114,7 +114,9 @@ class Statistics:
         said = readings[self._trust]
         piled = _counts(readings[self._read])[[0, -1]].tolist()
         values = [_log(np.count_nonzero(_counts(said))), *map(_root, piled)]
-        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(places)])
+        # The places at which readings are cut off, in units in which a step of them matters to nobody.
+        least, greatest = max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), least, greatest])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
@@ -197,14 +199,7 @@ class Statistics:
             return (low, farthest), (least, farthest)
         return (low, high), (least, greatest)
 
-    def _piles(self, places: tuple[float, float]) -> list[float]:
-        """Return the places [m] at which readings are cut off, in units in which a step of them matters to nobody."""
-        low, high = places
-        return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
-
-    def _leftover(
-        self, error: FloatArray, ends: tuple[float, float] = (-np.inf, np.inf)
-    ) -> tuple[FloatArray, FloatArray]:
+    def _leftover(self, error: FloatArray, ends: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), and the common modes (k,), in deviations.
 
         ends [m]: where readings are cut off. What lies beyond, or may by an error of the pose, says nothing.

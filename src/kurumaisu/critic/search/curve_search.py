@@ -106,7 +106,10 @@ class CurveSearch:
         columns = design.columns
         pull = columns.T @ beside.residual
         share = float(np.log(UNKNOWN_ODDS / len(design.curves)))
-        shares = [(0.0, 0.0)] if not len(beside.missed.variances) else _weights(beside)
+        shares = [(0.0, 0.0)]
+        if len(beside.missed.variances):  # that equations may miss, with the log of their posterior at the fit
+            gains = np.array([beside.missed.scaled(share).gain(beside.residual) for share in SHARES])
+            shares = list(zip(SHARES, gains - logsumexp(gains), strict=True))
         totals, best = self._evidences(design, beside, pull, shares)
         found = []
         for curve, nats, evidence in zip(design.curves, totals, best, strict=True):
@@ -203,12 +206,6 @@ def _share(span: FloatArray, level: FloatArray, signal: FloatArray) -> float:
     left = without(level, signal[:, None])[:, 0]
     square = float(left @ left)
     return float(np.sum((span.T @ left) ** 2)) / square if square > _NO_LEVEL * float(signal @ signal) else 0.0
-
-
-def _weights(beside: Beside) -> list[tuple[float, float]]:
-    """Return shares that equations may miss with the log of their posterior at a fit."""
-    gains = [beside.missed.scaled(share).gain(beside.residual) for share in SHARES]
-    return list(zip(SHARES, np.array(gains) - logsumexp(gains), strict=True))
 
 
 def nearly_same_rates(problem: Problem, fit: Fit) -> bool:

@@ -218,9 +218,16 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     total = logsumexp(np.concatenate([bare, curved]))
     weights, others = np.exp(bare - total), np.exp(curved - total)
     asked = (others > _SAID) | (curved > bare.max())
-    curves = [_told(one, fitted, search) if told else one for one, told in zip(found, asked, strict=True)]
+    # A set with a curve that draws an effect is told as the form of that effect.
+    curves = [
+        search.as_form(one, _larger(fitted, one.fit.candidates)) if told else one
+        for one, told in zip(found, asked, strict=True)
+    ]
+    acting = [(fit.ids, float(weight)) for fit, weight in zip(fits, weights, strict=True)]
+    for one, weight in zip(curves, others, strict=True):
+        acting.append((one.fit.ids | ({one.form_of} if one.form_of else set()), float(weight)))
     p = dict.fromkeys(names, 0.0)
-    for ids, weight in _acting(fits, weights, curves, others):
+    for ids, weight in acting:
         for name in ids:
             p[name] += weight
     p = {name: min(each, 1.0) for name, each in p.items()}  # but for rounding
@@ -233,16 +240,6 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     return SearchResult(tuple(fits), tuple(curves), p, p_curves, confounded(sets, p), enough)
 
 
-def _acting(
-    fits: Sequence[Fit], weights: FloatArray, curves: Sequence[SetWithCurve], others: FloatArray
-) -> list[tuple[frozenset[str], float]]:
-    """Return which effects act, and how likely that is, for each set without and with a curve."""
-    plain = [(fit.ids, float(w)) for fit, w in zip(fits, weights, strict=True)]
-    drawn = [frozenset() if one.form_of is None else frozenset({one.form_of}) for one in curves]
-    return plain + [(one.fit.ids | more, float(w)) for one, more, w in zip(curves, drawn, others, strict=True)]
-
-
-def _told(one: SetWithCurve, fitted: Mapping[frozenset[Candidate], Fit], search: CurveSearch) -> SetWithCurve:
-    """Return a set with a curve, told as the form of an effect that it draws, if there is one."""
-    own = one.fit.candidates
-    return search.as_form(one, [fit for chosen, fit in fitted.items() if own < chosen and len(chosen - own) == 1])
+def _larger(fitted: Mapping[frozenset[Candidate], Fit], own: frozenset[Candidate]) -> list[Fit]:
+    """Return the fits with one candidate more than a set has."""
+    return [fit for chosen, fit in fitted.items() if own < chosen and len(chosen - own) == 1]

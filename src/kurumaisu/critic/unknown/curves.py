@@ -167,22 +167,15 @@ def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
     return np.asarray(0.5 * (gained - np.log(spread).sum(axis=-1)))
 
 
-@dataclass(frozen=True)
-class Wave:
-    """Waves over a covariate that are looked for: their shortest and longest, in its unit, and in which channels."""
-
-    shortest: float
-    longest: float
-    channels: tuple[str, ...]
-
-
 # Girths of casters and drive wheels, and more: a wheel out of round takes a share of the way, a bent caster turns the
 # chair. People who sway, pumps and fans; tiles, seams and ramps of a floor.
+# Of waves over a covariate the shortest and longest, in its unit, and in which channels they are looked for.
+Wave = tuple[float, float, tuple[str, ...]]
 WAVES: Mapping[str, Wave] = {
-    "distance": Wave(0.3, 3.0, ("v_gain", "w")),
-    "time": Wave(2.0, 60.0, ("v_gain", "w")),
-    "x": Wave(0.3, 3.0, ("v_gain", "curvature")),
-    "y": Wave(0.3, 3.0, ("v_gain", "curvature")),
+    "distance": (0.3, 3.0, ("v_gain", "w")),
+    "time": (2.0, 60.0, ("v_gain", "w")),
+    "x": (0.3, 3.0, ("v_gain", "curvature")),
+    "y": (0.3, 3.0, ("v_gain", "curvature")),
 }
 _TURNS = 3.0  # in all of a drive, at least: fewer are a slope or a carpet
 _MOST = 150  # periods
@@ -211,19 +204,20 @@ def wave_periods(problem: Problem, settings: Sequence[EffectSetting]) -> dict[st
     return found
 
 
-def _wave_period(sought: _PeriodSearch, kind: Wave, longest: float) -> tuple[float, int] | None:
-    """Return the period that explains most, and out of how many; longest: as far as a drive goes."""
-    if longest < _TURNS * kind.shortest:
+def _wave_period(sought: _PeriodSearch, kind: Wave, far: float) -> tuple[float, int] | None:
+    """Return the period that explains most, and out of how many; far: as a drive goes at most."""
+    shortest, longest, channels = kind
+    if far < _TURNS * shortest:
         return None
-    low, high = max(1 / kind.longest, _TURNS / longest), 1 / kind.shortest
-    waves = np.linspace(low, high, int(np.clip(2 * longest * (high - low), 2, _MOST)))
-    gained = np.stack([sought.gained(channel, waves, 1) for channel in kind.channels])
+    low, high = max(1 / longest, _TURNS / far), 1 / shortest
+    waves = np.linspace(low, high, int(np.clip(2 * far * (high - low), 2, _MOST)))
+    gained = np.stack([sought.gained(channel, waves, 1) for channel in channels])
     channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
     # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
     apart, closer = waves[1] - waves[0], np.arange(-_CLOSER, _CLOSER + 1) / _CLOSER
     near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
     near = [some[(some >= low) & (some <= high)] for some in near]
-    found = [(wave, sought.gained(kind.channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
+    found = [(wave, sought.gained(channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
     likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
     return float(1 / likeliest), gained.size
 

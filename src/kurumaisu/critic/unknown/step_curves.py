@@ -73,7 +73,11 @@ class _StepPlaces:
 
     def add(self, gram: FloatArray, b: FloatArray) -> None:
         """Weigh the places by normal equations of a column of ones and one for each, and choose closer ones."""
-        grams, pulls = _two_sided(gram, b)
+        # Of what is below and beyond each place.
+        whole, beyond, both = gram[0, 0], np.diag(gram)[1:], gram[0, 1:]
+        cross = both - beyond
+        grams = np.array([[whole - 2 * both + beyond, cross], [cross, beyond]]).transpose(2, 0, 1)
+        pulls = np.column_stack([b[0] - b[1:], b[1:]])
         found = curve_evidences(grams, pulls, np.repeat(np.stack(_PRIORS)[None], len(grams), axis=0))
         seen = np.einsum("nii->ni", grams).min(axis=1) > _SEEN * gram[0, 0]
         nats = np.where(seen, [belief.nats for belief in found], -np.inf)
@@ -153,14 +157,6 @@ def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Ste
         known = np.unique(np.quantile(finite, np.linspace(0.0, 1.0, _PLACES + 1))) if len(finite) else finite
         if len(known) > 1:  # between values that were driven: at one of them it is not known which side it is on
             yield _StepPlaces(curve, (known[1:] + known[:-1]) / 2, 0.0)
-
-
-def _two_sided(gram: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return normal equations (places, 2, 2), (places, 2) of what is below and beyond each place."""
-    whole, beyond, both = gram[0, 0], np.diag(gram)[1:], gram[0, 1:]
-    cross = both - beyond
-    grams = np.array([[whole - 2 * both + beyond, cross], [cross, beyond]])
-    return grams.transpose(2, 0, 1), np.column_stack([b[0] - b[1:], b[1:]])
 
 
 def fine_curves(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[tuple[Curve, CurveEvidence]]:

@@ -80,7 +80,8 @@ def gather(recording: Recording, model: Model, creeping: Mapping[str, Sequence[f
     laser = laser_of(model.laser, recording.laser, recording.runs)
     runs = [run for run in recording.runs if run.name in recording.train and run.scan is not None and _referred(run)]
     chosen = [(i, index) for i, run in enumerate(runs) for index in _within(run)]
-    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, _most_scans(laser)).astype(int))]
+    most = int(MOST_SCANS * np.clip(_FAN / laser.beams, 1.0, _MORE))  # about as much to do as so many of an URG-04LX
+    chosen = [chosen[i] for i in np.unique(np.linspace(0, len(chosen) - 1, most).astype(int))]
     zero = time_zero(runs)
     tracks, stamps, measured = [], [], []
     names = set.intersection(*(set(run.covariates) for run in runs))
@@ -199,11 +200,6 @@ def laser_of(laser: Laser, mount: LaserMount | None, runs: Sequence[Run]) -> Las
             known = {name: getattr(fan, name) for name in ("angle_min", "angle_increment", "beams")}
             laser = replace(laser, **known, time_increment=increment)
     return laser
-
-
-def _most_scans(laser: Laser) -> int:
-    """Return how many scans are about as much to do as MOST_SCANS of an URG-04LX."""
-    return int(MOST_SCANS * np.clip(_FAN / laser.beams, 1.0, _MORE))
 
 
 def stands_averaged(times: FloatArray, poses: FloatArray, creeping: Sequence[float] = ()) -> FloatArray:

@@ -140,20 +140,21 @@ def compare_blocks(
     curved = [rival for rival in rivals if rival.unknown]
     total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
     sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
-    weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
     best = max(plain, key=lambda each: each[1])
-    p, confounded = confusion(weights, best[0], ids)
+
+    def weighed(sets: Sequence[tuple[frozenset[str], float]], total: float) -> FormPosterior:
+        p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in sets], best[0], ids)
+        return replace(found, p=p, confounded=confounded)
+
     lead = curved[0].log_posterior - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
         by_curve[rival.free.id] += float(np.exp(rival.log_posterior - total))
-    made = BlockComparison(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+    made = BlockComparison(weighed(sets, total), tuple(rivals), lead, by_curve)
     if lead > made.least:
         return made
     # A curve that does not lead by enough takes nothing from the effects that it imitates.
-    total = logsumexp([score for _, score in plain])
-    p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in plain], best[0], ids)
-    return replace(made, found=replace(found, p=p, confounded=confounded))
+    return replace(made, found=weighed(plain, logsumexp([score for _, score in plain])))
 
 
 class _Doubted:

@@ -86,7 +86,7 @@ def fit_parameters(
     if winner is not None:
         block = np.asarray(assembly.columns[:, :, winner.free.span] @ root_of(winner.evidence.prior))
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
-    moving = _strong(assembly, normal, _settings(forms, at)) or any(
+    moving = strength(assembly, normal, assembly.marks.together(_settings(forms, at))) > STRONG or any(
         not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
     )
     free = [each for i, form in enumerate(forms) for each in _free(i, form, at[i])]
@@ -134,11 +134,6 @@ def _signals(
     whole = assembly.marks.together(every)
     others = ([without if j == i else one for j, one in enumerate(every)] for i, without in absent.items())
     return [whole - assembly.marks.together(other) for other in others]
-
-
-def _strong(assembly: Assembly, normal: NormalEquations, settings: Sequence[EffectSetting]) -> bool:
-    """Tell whether effects move readings by more than they scatter anyway."""
-    return strength(assembly, normal, assembly.marks.together(settings)) > STRONG
 
 
 def strength(assembly: Assembly, normal: NormalEquations, change: FloatArray) -> float:
