@@ -6,19 +6,27 @@ Taking it from a table, or treating increments as independent, makes a critic na
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import attrgetter, itemgetter
 
 import numpy as np
 from scipy.linalg import qr
+from scipy.optimize import minimize
 from scipy.special import expit
 
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.noise.minimiser import minimise
 from kurumaisu.critic.values.prior import occam
 from kurumaisu.types import FloatArray
+
+_STEP = 0.01  # of a difference
+_OPTIONS = {"ftol": 3e-6, "maxiter": 60}
+# Within so much of the lowest place, and no lower: a line search that comes back to where it began. By what has been
+# learnt of the cost there is no way down any more, and twenty more trials, with a gradient each, would end there, too.
+_BACK = 1e-5
+
+Cost = Callable[[FloatArray], float]
 
 
 @dataclass(frozen=True)
@@ -63,18 +71,9 @@ class Noise:
     def quick(self) -> Noise:
         """Return the noise without what lasts: within _BRIEF it is as loud."""
         first, second = (min(1.0, float(np.sqrt(_BRIEF / tau))) for tau in (self.tau, self.slow_tau))
-        return replace(
-            self,
-            sd_v=first * self.sd_v,
-            sd_lateral=first * self.sd_lateral,
-            sd_w=first * self.sd_w,
-            tau=min(self.tau, _BRIEF),
-            slow_v=second * self.slow_v,
-            slow_lateral=second * self.slow_lateral,
-            slow_w=second * self.slow_w,
-            slow_tau=min(self.slow_tau, _BRIEF) if self.slow_v else self.slow_tau,
-            lasting=0.0,
-        )
+        sizes = {name: (second if name in _SECOND else first) * getattr(self, name) for name in _GROWING}
+        slow_tau = min(self.slow_tau, _BRIEF) if self.slow_v else self.slow_tau
+        return replace(self, **sizes, tau=min(self.tau, _BRIEF), slow_tau=slow_tau, lasting=0.0)
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
@@ -123,10 +122,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         drive.pose_paths,
         position_sd=noise.position_sd * noise.louder,
         heading_sd=noise.heading_sd * noise.louder,
-        process_sd=[
-            [noise.sd_v, noise.sd_lateral, noise.sd_w],
-            [noise.slow_v, noise.slow_lateral, noise.slow_w],
-        ],
+        process_sd=[[noise.sd_v, noise.sd_lateral, noise.sd_w], [noise.slow_v, noise.slow_lateral, noise.slow_w]],
         process_tau=[noise.tau, noise.slow_tau],
         lasting=(noise.lasting / noise.louder) ** 2,
         lasting_tau=noise.lasting_tau,
@@ -267,10 +263,7 @@ class NoiseResiduals:
         sizes = [name for name in _SECOND if name != "slow_tau"]
         tried = (
             replace(
-                one,
-                **{**slow, **{name: share * slow[name] for name in sizes}},
-                sd_v=k * one.sd_v,
-                sd_w=k * one.sd_w,
+                one, **{**slow, **{name: share * slow[name] for name in sizes}}, sd_v=k * one.sd_v, sd_w=k * one.sd_w
             )
             for share in _HINTS
             for k in (1.0, 0.85)
@@ -352,3 +345,49 @@ def _independent(columns: FloatArray) -> FloatArray:
     _, triangle, order = qr(columns[:, loud] / norms[loud], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(triangle))
     return np.asarray(np.sort(loud[order[: len(sizes)][sizes > _SAME][: len(columns) // 3]]))
+
+
+class _StuckError(Exception):
+    pass
+
+
+def minimise(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float]:
+    """Return the place (k,) of a local minimum within bounds (k, 2), searched for from another, and its cost.
+
+    Where it is stuck it forgets what it has learnt, and begins anew from there, until that is of no use.
+    """
+    where, least = begin, np.inf
+    while True:
+        before, (where, least, stuck) = least, _attempt(cost, where, bounds)
+        if not stuck or before - least <= _OPTIONS["ftol"] * max(abs(least), 1.0):
+            return where, least
+
+
+def _attempt(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float, bool]:
+    """Return the lowest place that was seen, its cost, and whether the search got stuck there."""
+    best, least = begin, np.inf
+
+    def with_gradient(at: FloatArray) -> tuple[float, FloatArray]:
+        nonlocal best, least
+        here = cost(at)
+        if here >= least and np.abs(at - best).max() < _BACK:
+            raise _StuckError
+        if here < least:
+            best, least = at.copy(), here
+        return here, _gradient(cost, at, here, bounds)
+
+    try:
+        found = minimize(with_gradient, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=_OPTIONS)
+    except _StuckError:
+        return best, least, True
+    return found.x, float(found.fun), False
+
+
+def _gradient(cost: Cost, at: FloatArray, here: float, bounds: FloatArray) -> FloatArray:
+    """Return the differences to neighbours, above where there is room."""
+    out = np.empty(len(at))
+    for i, upper in enumerate(bounds[:, 1]):
+        moved = at.copy()
+        moved[i] += _STEP if at[i] + _STEP <= upper else -_STEP
+        out[i] = (cost(moved) - here) / (moved[i] - at[i])
+    return out
