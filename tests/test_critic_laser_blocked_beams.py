@@ -8,7 +8,7 @@ import pytest
 from laser_scene import recording
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
+from kurumaisu.critic.ranges.scans.map_changes import blocked_beams, described
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -11,7 +11,7 @@ from laser_scene import sparse
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
-from kurumaisu.critic.ranges.search import dominant_effect
+from kurumaisu.critic.ranges.search import large_effect
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -37,12 +37,12 @@ def test_scans_that_are_taken_nearly_at_once_have_no_other_fault(own, tmp_path):
 
 
 def test_what_is_still_missing_of_it_makes_no_set(monkeypatch):
-    monkeypatch.setattr(dominant_effect, "misfits", lambda *_: ())
+    monkeypatch.setattr(large_effect, "misfits", lambda *_: ())
     assembly = SimpleNamespace(marks=SimpleNamespace(together=lambda _: np.zeros((1, 1))))
     lead = EffectSetting("laser.clock_skew", {"skew": -0.002})
     apart = ("laser.offset", "laser.warmup")
     rest = LaserFinding(confounded=(("laser.clock_skew", "laser.latency"), apart))
-    found = dominant_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
+    found = large_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
     assert found.confounded == (apart,)
     assert [cause.id for cause in found.causes] == [lead.id]
     assert found.settings == (lead,)
@@ -53,7 +53,7 @@ def test_what_is_still_missing_of_it_makes_no_set(monkeypatch):
 )
 def test_a_lead_of_which_nothing_is_left_beside_the_others_is_taken_back(monkeypatch, low, causes):
     """A clock that runs fast was a delay at first."""
-    monkeypatch.setattr(dominant_effect, "misfits", lambda *_: ())
+    monkeypatch.setattr(large_effect, "misfits", lambda *_: ())
     assembly = SimpleNamespace(marks=SimpleNamespace(together=lambda _: np.zeros((1, 1))))
     lead = EffectSetting("laser.latency", {"delay": 0.03})
     skew = EffectSetting("laser.clock_skew", {"skew": 0.005})
@@ -62,7 +62,7 @@ def test_a_lead_of_which_nothing_is_left_beside_the_others_is_taken_back(monkeyp
     drawn = tuple(SimpleNamespace(explained_by=name) for name in ("laser.latency", "laser.clock_skew"))
     settings = (replace(lead, parameters={"delay": 0.002}), skew)
     rest = LaserFinding(causes=(again, other), settings=settings, pictures=Pictures(misfits=drawn))
-    found = dominant_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
+    found = large_effect.with_dominant(rest, lead, Cause(lead.id, 1.0, {}, 50.0), assembly, None)
     assert [cause.id for cause in found.causes] == causes
     assert [setting.id for setting in found.settings] == causes
     assert [misfit.explained_by for misfit in found.pictures.misfits] == ["laser.clock_skew"]

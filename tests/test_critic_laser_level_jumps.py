@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from kurumaisu.bench.hidden.laser.forms import ar1
-from kurumaisu.critic.ranges.noise.level_jumps import knots_parted, level_jumps
+from kurumaisu.critic.ranges.signals.coefficient_blocks import knots_parted, level_jumps
 
 STAND = np.repeat([-1, 0, 1, 2], 20)
 

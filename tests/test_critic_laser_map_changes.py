@@ -9,8 +9,7 @@ from laser_scene import recording, sparse
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.scans.gathering import gather
-from kurumaisu.critic.ranges.scans.map_changes import map_change
-from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_objects
+from kurumaisu.critic.ranges.scans.map_changes import Sights, map_change, passing_objects
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.params import load_model, shipped
 
@@ -206,7 +205,7 @@ def test_where_far_walls_are_cut_off_what_stands_before_them_is_no_other_map(tmp
 def test_a_wall_that_is_not_where_the_map_has_it_is_unknown(tmp_path):
     data = recording(tmp_path, "laser.mount_x", 0.05, 12, scans=30)
     assembly = Assembly(gather(data, MODEL))
-    hits, base = assembly.hits(), assembly.marks.base
+    hits, base = assembly.marks.seen.ends(assembly.marks.base), assembly.marks.base
     part = np.isfinite(base) & (hits[:, :, 0] > np.nanquantile(hits[:, :, 0], 0.93))
     assert assembly.mapped.all()
 

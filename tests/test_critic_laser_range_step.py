@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.critic.ranges.scans.range_step import unrounded
+from kurumaisu.critic.ranges.scans.valid_readings import unrounded
 
 RANGES = np.random.default_rng(1).uniform(0.3, 3.8, (20, 300))
 RANGES[(RANGES > 1.5) & (RANGES < 2.4)] = 0.7  # no wall is there

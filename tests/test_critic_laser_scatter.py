@@ -14,7 +14,7 @@ from kurumaisu.critic.ranges.noise.reading_noise import BeamNoise, _repeated, es
 from kurumaisu.critic.ranges.noise.shared_errors import Layout, ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.gathering import gather
-from kurumaisu.critic.ranges.scans.range_step import grid_step
+from kurumaisu.critic.ranges.scans.valid_readings import grid_step
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece

@@ -12,8 +12,7 @@ from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search.confounding import confounded
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
-from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
-from kurumaisu.critic.ranges.signals.shape_grids import grid_of
+from kurumaisu.critic.ranges.signals.effect_columns import Column, Form, grid_of
 from kurumaisu.critic.values.laser_finding import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import Cause, Estimate

@@ -11,8 +11,7 @@ from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.poses.creeping_stands import creeping_stands, gather_stands
-from kurumaisu.critic.ranges.scans.gathering import gather
-from kurumaisu.critic.ranges.scans.standstill import stands_averaged, with_pause_rows
+from kurumaisu.critic.ranges.scans.gathering import gather, stands_averaged, with_pause_rows
 from kurumaisu.critic.ranges.scans.valid_readings import pose_weights
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.effect_columns import Column, EffectColumns, Form

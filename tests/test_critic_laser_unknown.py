@@ -13,10 +13,17 @@ from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
-from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, whitened
-from kurumaisu.critic.ranges.poses.likeliest_path import PoseEvidence, likeliest_path, motion_evidence
-from kurumaisu.critic.ranges.scans.standstill import stands_averaged
+from kurumaisu.critic.ranges.noise.shared_errors import (
+    Gram,
+    Layout,
+    OffsetProducts,
+    ScanNoise,
+    offset_products,
+    whitened,
+    without_beam_offsets,
+)
+from kurumaisu.critic.ranges.poses.pose_corrections import PoseEvidence, likeliest_path, motion_evidence
+from kurumaisu.critic.ranges.scans.gathering import stands_averaged
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series

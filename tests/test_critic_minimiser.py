@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from kurumaisu.critic.noise.minimiser import minimise
+from kurumaisu.critic.noise.base_noise import minimise
 
 OPTIONS = {"eps": 0.01, "ftol": 3e-6, "maxiter": 60}
 

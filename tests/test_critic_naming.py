@@ -22,8 +22,7 @@ from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_ou
 from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.search import search
-from kurumaisu.critic.search.confounding import SetPosterior, confounded
-from kurumaisu.critic.search.posterior import SearchResult
+from kurumaisu.critic.search.posterior import SearchResult, SetPosterior, confounded
 from kurumaisu.critic.values.verdict import Gain, LogDensityGain
 from kurumaisu.effects import Parameter
 from kurumaisu.params import load_model, shipped

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from kurumaisu.critic.ranges.scans.pixel_lines import straightened
+from kurumaisu.critic.ranges.scans.walls import straightened
 from kurumaisu.world.bitmaps import outline
 
 MIDDLES = np.arange(200) + 0.5

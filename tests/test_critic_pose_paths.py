@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from kurumaisu import geometry
-from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.base.pose_paths import pose_paths
+from kurumaisu.critic.base.drive import GRID, Drive, pose_paths
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 
 STEP = 0.0005  # [s]

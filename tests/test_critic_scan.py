@@ -10,7 +10,7 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.engine.scan import Dictionary, scan
+from kurumaisu.critic.search.search import Dictionary, scan
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

@@ -7,8 +7,7 @@ import laser_scene
 import numpy as np
 import pytest
 
-from kurumaisu.critic.ranges.scans.gathering import laser_of
-from kurumaisu.critic.ranges.scans.sweep_time import with_sweep_time
+from kurumaisu.critic.ranges.scans.gathering import laser_of, with_sweep_time
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.params import load_model, shipped
 

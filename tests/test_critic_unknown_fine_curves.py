@@ -11,7 +11,7 @@ from kurumaisu.critic.search import search
 from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.bases import Basis, knots_of
-from kurumaisu.critic.unknown.periods import wave_periods
+from kurumaisu.critic.unknown.curves import wave_periods
 from kurumaisu.effects import Motion
 
 GIRTH = 1.137  # [m]

@@ -10,9 +10,8 @@ from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import edges_of, prepare, split
-from kurumaisu.critic.base.reference_sensitivity import reference_increments
-from kurumaisu.critic.base.sensitivity import Sensitivity
-from kurumaisu.critic.unknown import periods
+from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
+from kurumaisu.critic.unknown import curves as curves_
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.effects import smooth_id
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -95,7 +94,7 @@ def test_a_sparse_basis_does_what_it_does_written_out(drive, channel):
 def test_waves_that_are_turned_on_from_one_to_the_next_are_waves():
     way = np.linspace(0.0, 80.0, 500)
     waves = np.linspace(0.4, 3.3, 37)  # more than go at once, and no multiple of it
-    waved = np.column_stack(list(periods._waves(way, waves))).reshape(len(way), -1, 2)
+    waved = np.column_stack(list(curves_._waves(way, waves))).reshape(len(way), -1, 2)
     phase = 2 * np.pi * np.multiply.outer(way, waves)
     np.testing.assert_allclose(waved, np.stack([np.cos(phase), np.sin(phase)], axis=-1), atol=1e-11)
 

@@ -22,7 +22,7 @@ from kurumaisu.critic.judge.robots import with_robot
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
-from kurumaisu.critic.ranges.scans.sweep_time import with_sweep_time
+from kurumaisu.critic.ranges.scans.gathering import with_sweep_time
 from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.sanity import examination, masks
 from kurumaisu.critic.values.criticism import Criticism

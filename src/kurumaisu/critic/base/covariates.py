@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu import _core, geometry
 from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
 
 _SMOOTH = 1.0  # [s] before and after a row
@@ -32,7 +32,8 @@ def with_covariates_but_place(drive: Drive, run: Run) -> Drive:
     middle = _middle(drive)
     known = {name: np.interp(middle, series.t, series.values[:, 0]) for name, series in run.covariates.items()}
     if run.voltage is not None:
-        known |= {name: _held(run.voltage, name, middle) for name in ("v_f", "v_s")}
+        held = np.maximum(np.searchsorted(run.voltage.t, middle, side="right") - 1, 0)
+        known |= {name: run.voltage.column(name)[held] for name in ("v_f", "v_s")}
     return replace(drive, known={**drive.known, **known})
 
 
@@ -51,8 +52,3 @@ def _smoothed(drive: Drive) -> FloatArray:
 
 def _middle(drive: Drive) -> FloatArray:
     return np.asarray(drive.start + GRID * (np.arange(len(drive.v)) + 0.5))
-
-
-def _held(series: Series, column: str, at: FloatArray) -> FloatArray:
-    index = np.searchsorted(series.t, at, side="right") - 1
-    return np.asarray(series.column(column)[np.maximum(index, 0)])

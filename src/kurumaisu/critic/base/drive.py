@@ -12,14 +12,14 @@ import numpy as np
 
 from kurumaisu import _core, geometry
 from kurumaisu._core import AxisInverse
-from kurumaisu.critic.base.pose_paths import pose_paths
 from kurumaisu.critic.base.voltage_signs import voltage_signs
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.effects import LATE
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
+_POINTS = 16  # of each increment: commands change once in it, seldom twice
 GRID = 0.01  # [s] step of the replay; half a sample of the fastest command rate in use (50 Hz)
 _CLOCK = 0.02  # share by which the reference's clock may be off, and more
 LONGEST = 100_000.0  # [s] a day: what is longer has its times in another unit, and its grid would fill the memory
@@ -31,6 +31,35 @@ _GAP, _USUAL_STEPS = 0.5, 3.0  # [s], and steps of the reference: in what is lon
 # over short intervals its noise, in the input and in the residual alike, would pass for a gain below 1 (errors in
 # variables), while over long ones it averages out.
 POSE_INTERVAL = {"voltage": 0.1, "command": 0.1, "odom": 2.0}
+
+
+def pose_paths(times: FloatArray, poses: FloatArray, edges: FloatArray, path: FloatArray) -> FloatArray:
+    """Return how a chair went from each reference pose to the next, (m, 8).
+
+    Means of the heading's cosine and sine and of the way x, y [m] that lies ahead, in the frame of the first pose; and
+    by how much each of them grows from its beginning to its end, by least squares.
+
+    times (m + 1,) and poses (m + 1, 3) of the reference; path (n, 3): poses that were asked for at edges (n,) of time.
+    The way is half way between what was asked for and what was measured.
+    """
+    share = (np.arange(_POINTS) + 0.5) / _POINTS
+    at = times[:-1, None] + np.diff(times)[:, None] * np.append(share, 1.0)
+    begin = np.stack([np.interp(times[:-1], edges, column) for column in path.T], axis=-1)
+    asked = np.stack([np.interp(at, edges, column) for column in path.T], axis=-1)
+    gone = geometry.between(begin[:, None], asked)
+    off = geometry.between(poses[:-1], poses[1:]) - gone[:, -1]
+    off[:, 2] = geometry.wrap(off[:, 2])
+    # Of what differs, the squares cancel about the middle: a derivative about either end sees a speed and a turn that
+    # are both off as a slip.
+    off *= 0.5
+    gone[:, :-1] += off[:, None] * share[:, None]
+    gone[:, -1] += off
+    ahead = gone[:, -1:, :2] - gone[:, :-1, :2]
+    heading = gone[:, :-1, 2, None]
+    along = np.concatenate([np.cos(heading), np.sin(heading), ahead], axis=-1)
+    late = share - 0.5
+    slope = np.einsum("mpk,p->mk", along, late / (late @ late))
+    return np.concatenate([along.mean(axis=1), slope], axis=1)
 
 
 @dataclass(frozen=True)
@@ -204,18 +233,17 @@ def split(drive: Drive, parts: int) -> list[Drive]:
 
 def without_spans(drive: Drive, spans: Sequence[tuple[float, float]]) -> list[Drive]:
     """Return the drive without the increments that lie within spans of time [s]; each piece keeps all inputs."""
-    if not spans:
-        return [drive]
     since, until = drive.times[:-1], drive.times[1:]
-    held = np.any([(until > a) & (since < b) for a, b in spans], axis=0)
-    edges = np.concatenate([[-1], np.flatnonzero(held), [len(drive.times) - 1]])
-    return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
+    return _without(drive, np.any([(until > a) & (since < b) for a, b in spans], axis=0)) if spans else [drive]
 
 
 def pieces(drive: Drive, gap: float) -> list[Drive]:
     """Return the drive without the increments that are longer than a gap [s]; each piece keeps all inputs."""
-    long = np.flatnonzero(np.diff(drive.times) > gap)
-    edges = np.concatenate([[-1], long, [len(drive.times) - 1]])
+    return _without(drive, np.diff(drive.times) > gap)
+
+
+def _without(drive: Drive, out: BoolArray) -> list[Drive]:
+    edges = np.concatenate([[-1], np.flatnonzero(out), [len(drive.times) - 1]])
     return [piece for a, b in pairwise(edges) for piece in _cut(drive, np.array([a + 1, b]))]
 
 

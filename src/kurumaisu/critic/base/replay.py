@@ -4,9 +4,10 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,10 @@ from kurumaisu.types import FloatArray
 
 _ROOM = 3 * 2**25  # bytes of increments that are kept: for ten minutes of driving, nearly all that are asked for again
 _UNUSED = np.random.default_rng(0)  # nothing is drawn: effects that draw are left out
+PICTURE = 0.1  # [s] between the poses drawn
+# [s] after which a simulated path begins again at the measured pose: the random wander of the heading adds up, and
+# after a minute hides what the model does.
+RESTART = 10.0
 
 
 def model_of(recording: Recording, model_file: Path, *, assume_law: bool) -> Model:
@@ -136,15 +141,10 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     start = 0.0 if started is None else float(started[0])
     times = start + GRID * np.arange(len(poses))
     curved = any(isinstance(effect, effects.SmoothReference) for effect in chair.effects.reference)
-    known = _at_edges(motion) if curved else {}
+    known = {**motion.known, "v": motion.v, "w": motion.w} if curved else {}
+    known = {name: edges_of(values) for name, values in known.items()}
     measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
     return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
-
-
-def _at_edges(motion: effects.Motion) -> dict[str, FloatArray]:
-    """Return what is known of a motion's steps (n,), and its rates, at their edges, (n + 1,) each."""
-    own = {**motion.known, "v": motion.v, "w": motion.w}
-    return {name: edges_of(values) for name, values in own.items()}
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:
@@ -159,3 +159,15 @@ def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tu
 @cache
 def _random() -> frozenset[str]:
     return frozenset(effect.id for effect in effects.ALL if effect.random)
+
+
+def restarted_path(drive: Drive, path: FloatArray) -> Iterator[tuple[slice, FloatArray]]:
+    """Yield the pieces of a simulated path (n, 3): rows of the drive's poses, and poses (k, 3) in the map there.
+
+    The last row of a piece is the first of the next: there the one has ended, and the other begins.
+    """
+    since = drive.times - drive.times[0]
+    bounds = np.unique([*np.flatnonzero(np.diff(since // RESTART, prepend=-1.0)), len(since) - 1])
+    for a, b in pairwise(bounds.tolist()):
+        rows = slice(a, b + 1)
+        yield rows, geometry.compose(drive.poses[a], geometry.between(path[a], path[rows]))

@@ -3,13 +3,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from kurumaisu import effects
-from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu import effects, geometry
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, edges_of
+from kurumaisu.params import Model
 from kurumaisu.sim import plant
 from kurumaisu.types import FloatArray
 
@@ -85,3 +88,56 @@ class Sensitivity:
     def _in_body(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
         cos, sin = (side(self._headings[:-1])[self._increment] for side in (np.cos, np.sin))
         return cos * x + sin * y, cos * y - sin * x
+
+
+def reference_increments(drive: Drive, motion: effects.Motion, channel: str, errors: FloatArray) -> FloatArray:
+    """Return the change of the increments by errors (n + 1, k) at the grid's edges in a channel of the reference.
+
+    (3 m, k).
+    """
+    poses = drive.at_poses(plant.path(motion, np.array([0.0, 0.0, motion.heading or 0.0])))
+    known = motion.known.get("heading")
+    heading = poses[:, 2] if known is None else drive.at_poses(edges_of(known))
+    axis, _ = effects.REFERENCE_CHANNELS[channel]
+    size = drive.at_poses(errors)
+    steps = geometry.between(poses[:-1], poses[1:])
+    out = np.zeros((len(steps), 3, errors.shape[1]))
+    before, after = size[:-1], size[1:]
+    if axis == 2:  # what is seen turned to the left goes to the right
+        out[:, 0], out[:, 1] = steps[:, 1:2] * before, -steps[:, 0:1] * before
+        out[:, 2] = after - before
+    else:  # a shift in the map, as the chair sees it
+        ahead = 0.5 * np.pi * axis - heading
+        at_end, at_start = ahead[1:] + steps[:, 2], ahead[:-1]
+        out[:, 0] = np.cos(at_end)[:, np.newaxis] * after - np.cos(at_start)[:, np.newaxis] * before
+        out[:, 1] = np.sin(at_end)[:, np.newaxis] * after - np.sin(at_start)[:, np.newaxis] * before
+    return out.reshape(3 * len(steps), -1)
+
+
+def free_columns(drive: Drive, model: Model) -> FloatArray:
+    """Return the columns (3 m, k) of a drive's increments, whose normal shares are its free moments before the data."""
+    free = drive.free
+    if free is None:
+        return np.empty((3 * (len(drive.times) - 1), 0))
+    near = (free.middles > drive.times[0] - free.width) & (free.middles < drive.times[-1] + free.width)
+    motion = replay.motion(drive, model, ())
+    moments = hats(drive, len(motion.moving), free.middles[near], free.width)
+    return free.sd * Sensitivity(drive, motion).increments(free.channel, moments)
+
+
+def all_free_columns(drives: Sequence[Drive], model: Model) -> list[FloatArray]:
+    """Return the free columns of each of several drives, (3 m, k) each, k for the moments of all."""
+    own = [free_columns(drive, model) for drive in drives]
+    ends = np.cumsum([0, *(columns.shape[1] for columns in own)])
+    return [
+        np.pad(columns, ((0, 0), (before, ends[-1] - after)))
+        for columns, (before, after) in zip(own, pairwise(ends.tolist()), strict=True)
+    ]
+
+
+def hats(drive: Drive, cells: int, middles: FloatArray, width: float, again: float = np.inf) -> FloatArray:
+    """Return a hat about each of some middles [s], and again every so many, over a drive's grid, (cells, k)."""
+    off = drive.start + GRID * (np.arange(cells) + 0.5)[:, np.newaxis] - middles
+    if np.isfinite(again):
+        off -= again * np.rint(off / again)
+    return np.asarray(np.maximum(1 - np.abs(off) / width, 0.0))

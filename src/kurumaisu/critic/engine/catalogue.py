@@ -133,18 +133,18 @@ def _showing(own: Sequence[Term], norm: Norm) -> Iterator[Term]:
                 yield replace(term, step=0.2, shape=True)
 
 
-def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> tuple[Term, ...]:
-    """Return the terms, marked where another step does not do its share of the same; moved: the change by settings."""
-    return tuple(term if term.shape else _marked(term, moved) for term in terms)
-
-
-def _marked(term: Term, moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> Term:
-    p = term.parameter
-    steps = np.clip(term.null + np.array([0.5, 1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
-    half, one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
-    norms = float(np.linalg.norm(one) * np.linalg.norm(two))
-    rough = norms > 0 and float(one @ two) < _STRAIGHT * norms
-    return replace(term, rough=rough, sudden=float(np.linalg.norm(half)) < _SUDDEN * float(np.linalg.norm(one)))
+def roughened(terms: Iterable[Term], moved: Callable[[tuple[EffectSetting, ...]], FloatArray]) -> Iterator[Term]:
+    """Yield the terms, marked where another step does not do its share of the same; moved: the change by settings."""
+    for term in terms:
+        if term.shape:
+            yield term
+            continue
+        p = term.parameter
+        steps = np.clip(term.null + np.array([0.5, 1.0, 2.0]) * term.step * p.scale, p.lower, p.upper)
+        half, one, two = (moved(settings_of([term], np.array([value]))) for value in steps)
+        norms = float(np.linalg.norm(one) * np.linalg.norm(two))
+        sudden = float(np.linalg.norm(half)) < _SUDDEN * float(np.linalg.norm(one))
+        yield replace(term, rough=norms > 0 and float(one @ two) < _STRAIGHT * norms, sudden=sudden)
 
 
 def _typical_step(term: Term, norm: Callable[[float], float]) -> float | None:
@@ -180,7 +180,9 @@ def candidates(terms: Sequence[Term], model: Model, ids: frozenset[str] | None =
     own = {setting.id for setting in model.effects}
     for effect in effects.of_base(voltages=model.robot.voltages):
         if effect.choices and effect.id not in own:
-            found += _choices(effect) if ids is None or effect.id in ids else []
+            for choice in effect.choices if ids is None or effect.id in ids else ():
+                fixed = tuple(_fixed(effect.id, parameter, choice) for parameter in effect.parameters)
+                found.append(Candidate(effect.id, fixed, len(effect.choices)))
             continue
         amplitudes = [term for term in terms if term.id == effect.id and not term.shape]
         shapes = [term for term in terms if term.id == effect.id and term.shape]
@@ -210,12 +212,6 @@ def _forms(
         fixed = tuple(_fixed(effect.id, parameter, form) for parameter in effect.parameters if parameter.name in form)
         usual = _USUAL if len(forms) > 1 else 1.0
         yield fixed, (len(forms) - 1) / (1 - usual) if i else 1 / usual, i == 0
-
-
-def _choices(effect: type[effects.BaseEffect]) -> Iterator[Candidate]:
-    for choice in effect.choices:
-        terms = tuple(_fixed(effect.id, parameter, choice) for parameter in effect.parameters)
-        yield Candidate(effect.id, terms, len(effect.choices))
 
 
 def _fixed(name: str, parameter: Parameter, values: Mapping[str, float]) -> Term:

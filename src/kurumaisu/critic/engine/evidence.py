@@ -14,7 +14,7 @@ from kurumaisu import effects
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.base.free_moments import free_columns
+from kurumaisu.critic.base.sensitivity import free_columns
 from kurumaisu.critic.engine import least_squares
 from kurumaisu.critic.engine.catalogue import (
     Candidate,
@@ -28,8 +28,7 @@ from kurumaisu.critic.engine.catalogue import (
 )
 from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
 from kurumaisu.critic.engine.form_error import SHARES, form_errors
-from kurumaisu.critic.engine.start_values import StartValues
-from kurumaisu.critic.engine.step_likelihood import StepLikelihood, Walked
+from kurumaisu.critic.engine.step_likelihood import StartValues, Walked
 from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
 from kurumaisu.critic.values.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
@@ -158,7 +157,7 @@ class Problem:
             return np.concatenate([self._whitened(drive, settings) for drive in self.drives]) - here
 
         shown = showing(catalogue(self.model, self.ids), lambda settings: float(np.linalg.norm(moved(settings))))
-        return roughened(shown, moved)
+        return tuple(roughened(shown, moved))
 
     @cached_property
     def candidates(self) -> tuple[Candidate, ...]:
@@ -252,7 +251,8 @@ class Problem:
     def _beside(self, terms: Sequence[Term], solution: least_squares.Solution) -> Beside:
         own = orthonormal(solution.slopes)
         blocks = {name: Covariance(some) for name, some in form_errors(self, terms, solution.values, own).items()}
-        missed = _together(len(own), list(blocks.values()))
+        many = [np.empty((len(own), 0)), *(one.columns for one in blocks.values())]
+        missed = next(iter(blocks.values())) if len(blocks) == 1 else Covariance(np.column_stack(many))
         left = without(own, solution.residual)
         gains = [missed.scaled(share).gain(left) for share in SHARES]
         best = SHARES[int(np.argmax(gains))]
@@ -262,7 +262,7 @@ class Problem:
     @cached_property
     def start_values(self) -> StartValues:
         """Return what finds first values, and those of what has many likely values."""
-        return StartValues(self, lambda: StepLikelihood(self.drives, self.model, self.noise, self._walked))
+        return StartValues(self, self._walked)
 
     def _occam(self, chosen: Sequence[Candidate], terms: Sequence[Term], solution: least_squares.Solution) -> float:
         """Return what the set costs, in nats: Laplace's approximation about the fit, with the prior of each signal."""
@@ -272,15 +272,21 @@ class Problem:
             own = [i for i, term in enumerate(terms) if term.id == candidate.id and not term.fixed]
             loud = [i for i in own if not terms[i].shape]
             free += loud
-            cost += sum(_shape_cost(terms[i], solution, i) for i in own if terms[i].shape)
+            # Of a shape the prior is normal about its null with its scale; least_squares has its misfit.
+            scales = [terms[i].parameter.scale / solution.sds[i] for i in own if terms[i].shape]
+            cost += sum(float(np.log(np.hypot(1.0, scale))) for scale in scales)
             size = self._amplitudes(terms, solution, loud)
             ways = _ROUGH_WAYS if candidate.rough else 0.0
             size -= 0.0 if effects.by_id(candidate.id).separable else _proportion(terms, solution, loud)
             cost += max(ways + size, _step_cost(terms, solution, loud))
         if len(free) > 1:
-            unit = solution.slopes[:, free] / np.maximum(np.linalg.norm(solution.slopes[:, free], axis=0), 1e-9)
-            cost += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(free)) / Z_USUAL**2)[1])
-            cost -= self._within(terms, solution, chosen)
+            cost += _alike(solution.slopes[:, free])
+            # Less what an effect with two amplitudes has by itself: z counts it.
+            total = 0.0
+            for candidate in chosen:
+                own = [i for i in free if terms[i].id == candidate.id]
+                total += _alike(solution.slopes[:, own]) if len(own) > 1 else 0.0
+            cost -= total
         return cost
 
     def _amplitudes(self, terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
@@ -307,16 +313,6 @@ class Problem:
                 return False
             larger[i] = np.clip(larger[i] + _LARGER * size, p.lower, p.upper)
         return float(np.linalg.norm(self.residual(terms, larger) - solution.residual)) < 1
-
-    def _within(self, terms: Sequence[Term], solution: least_squares.Solution, chosen: Sequence[Candidate]) -> float:
-        """Return the part of the log determinant that an effect with two amplitudes has by itself: z counts it."""
-        total = 0.0
-        for candidate in chosen:
-            own = [i for i, t in enumerate(terms) if t.id == candidate.id and not t.fixed and not t.shape]
-            if len(own) > 1:
-                unit = solution.slopes[:, own] / np.maximum(np.linalg.norm(solution.slopes[:, own], axis=0), 1e-9)
-                total += 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(len(own)) / Z_USUAL**2)[1])
-        return total
 
     def _moves(
         self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]
@@ -350,19 +346,10 @@ class Problem:
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
 
 
-def _together(rows: int, blocks: Sequence[Covariance]) -> Covariance:
-    """Return the noise of several causes whose equations miss something."""
-    if len(blocks) == 1:
-        return blocks[0]
-    return Covariance(np.column_stack([np.empty((rows, 0)), *(one.columns for one in blocks)]))
-
-
-def covariance(gram: FloatArray) -> FloatArray:
-    """Return the covariance of parameters, in units of their steps, for G = J'J with columns per step.
-
-    A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
-    """
-    return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))
+def _alike(slopes: FloatArray) -> float:
+    """Return half the log determinant of how slopes (rows, k) correlate."""
+    unit = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-9)
+    return 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(slopes.shape[1]) / Z_USUAL**2)[1])
 
 
 def _proportion(terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
@@ -382,7 +369,7 @@ def _proportion(terms: Sequence[Term], solution: least_squares.Solution, loud: S
     slopes = solution.slopes[:, free]
     inside = [free.index(i) for i in use]
     whole = slopes.T @ slopes + np.diag(np.square(tight).astype(np.float64))
-    spread = covariance(whole)[np.ix_(inside, inside)]
+    spread = least_squares.covariance(whole)[np.ix_(inside, inside)]
     spread = spread * np.outer(step[inside], step[inside])
     own = slopes[:, inside] / step[inside]
     sizes = np.array([(solution.values[i] - terms[i].null) / terms[i].parameter.scale for i in use])
@@ -401,8 +388,3 @@ def _step_cost(terms: Sequence[Term], solution: least_squares.Solution, loud: Se
     sds = [solution.sds[i] for i in many]
     width = np.sqrt(2 * np.pi) * np.array(sds) / np.maximum(sizes, 1e-12)
     return float(np.sum(_ROUGH_RANGE - np.log(np.clip(width, 1e-6, 1.0))))
-
-
-def _shape_cost(term: Term, solution: least_squares.Solution, i: int) -> float:
-    """Return the cost of a shape, whose prior is normal about its null with its scale; least_squares has its misfit."""
-    return float(np.log(np.hypot(1.0, term.parameter.scale / solution.sds[i])))

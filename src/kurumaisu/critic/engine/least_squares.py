@@ -5,29 +5,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.types import BoolArray, FloatArray
 
+if TYPE_CHECKING:
+    from kurumaisu.critic.engine.evidence import Problem
+
 _ROUNDS = 25
 _ENOUGH = 0.01  # [nat] less to gain ends the search
 _SAME_SLOPES = 0.1  # [nat] a step that gains less, half a standard deviation at most, leaves the slopes as they were
 _DAMPING = (1e-4, 0.3, 8.0, 1e6)  # at first, on success, on failure, at last
-
-
-class Linearised(Protocol):
-    """What can be fitted."""
-
-    def residual(self, terms: Sequence[Term], values: FloatArray) -> FloatArray:
-        """Return the whitened residual."""
-
-    def linearised(
-        self, terms: Sequence[Term], values: FloatArray, of: Sequence[Term]
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the whitened residual and minus its derivative per step."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +32,7 @@ class Solution:
     slopes: FloatArray
 
 
-def least_squares(problem: Linearised, terms: Sequence[Term], start: FloatArray) -> Solution:
+def least_squares(problem: Problem, terms: Sequence[Term], start: FloatArray) -> Solution:
     """Return the best values within their bounds near a start."""
     unit = np.array([term.step * term.parameter.scale for term in terms])
     lower, upper = (np.array([getattr(term.parameter, side) for term in terms]) for side in ("lower", "upper"))
@@ -87,7 +78,7 @@ def least_squares(problem: Linearised, terms: Sequence[Term], start: FloatArray)
     return Solution(values, _sds(slopes, tight, lower == upper) * np.abs(unit), cost, residual, slopes)
 
 
-def _linearised(problem: Linearised, terms: Sequence[Term], values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _linearised(problem: Problem, terms: Sequence[Term], values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the residual and the slopes, which are 0 for what is fixed."""
     free = np.array([not term.fixed for term in terms])
     residual, some = problem.linearised(terms, values, [term for term in terms if not term.fixed])
@@ -109,12 +100,17 @@ def _step(gram: FloatArray, pull: FloatArray, stuck: BoolArray, damping: float) 
 
 
 def _sds(slopes: FloatArray, tight: FloatArray, fixed: BoolArray) -> FloatArray:
-    """Return standard deviations in units of the steps; 0 of what is fixed.
-
-    A weak prior of 1000 steps keeps them finite where the data do not determine a parameter at all.
-    """
+    """Return standard deviations in units of the steps; 0 of what is fixed."""
     sds = np.zeros(len(tight))
     free = ~fixed
-    gram = slopes[:, free].T @ slopes[:, free] + np.diag(tight[free] ** 2) + 1e-6 * np.eye(int(free.sum()))
-    sds[free] = np.sqrt(np.diag(np.linalg.inv(gram)))
+    gram: FloatArray = np.asarray(slopes[:, free].T @ slopes[:, free], dtype=np.float64)
+    sds[free] = np.sqrt(np.diag(covariance(gram + np.diag(tight[free] ** 2))))
     return sds
+
+
+def covariance(gram: FloatArray) -> FloatArray:
+    """Return the covariance of parameters, in units of their steps, for G = J'J with columns per step.
+
+    A weak prior of 1000 steps keeps it finite where the data do not determine a parameter at all.
+    """
+    return np.asarray(np.linalg.inv(gram + 1e-6 * np.eye(len(gram))))

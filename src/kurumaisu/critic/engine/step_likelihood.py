@@ -8,8 +8,10 @@ times, it tells what any change would explain.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -17,11 +19,15 @@ from scipy.sparse import csr_array
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.base.sensitivity import Sensitivity
-from kurumaisu.critic.engine.catalogue import Term, settings_of
+from kurumaisu.critic.engine import least_squares
+from kurumaisu.critic.engine.catalogue import Key, Term, settings_of
 from kurumaisu.critic.noise.base_noise import Noise, whitened
 from kurumaisu.effects import Motion
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
+
+if TYPE_CHECKING:
+    from kurumaisu.critic.engine.evidence import Problem
 
 _CELLS = 20  # of the grid for which a change of the rates is held
 _TOTAL, _LEAST = 180.0, 10.0  # [s] of all drives, and of one drive at least: a first value needs no more
@@ -45,6 +51,10 @@ _PRECISION = np.float32  # of what only first values come of: half the room and 
 Way = tuple[object, ...]  # an effect's parameter, with the form in which it acts
 Walk = tuple[float, FloatArray]  # a size with what it changes, (bins,)
 Walked = dict[Way, tuple[FloatArray, FloatArray]]  # sizes (k,), and what each changes, (k, bins)
+_STARTS = (1.0, 4.0, 16.0)  # steps from null, either way, from which a fit may start
+_PLACES = 17  # that are tried on a peak
+_ROUNDS, _BETTER = 8, 0.1  # how often a peak is left for a likelier one close by, and by how much that is so [nat]
+STEP_EVIDENCE = 4.0  # [nat] less is not worth a closer look: a peak costs more
 
 
 @dataclass(frozen=True)
@@ -64,7 +74,6 @@ class StepLikelihood:
         self._model, self._walked = model, walked
         share = max(_TOTAL / len(drives), _LEAST)
         self._drives = [_begin(drive, share) for drive in drives[: int(_TOTAL / share)]]
-        self.share = sum(len(drive.times) for drive in drives) / sum(len(drive.times) for drive in self._drives)
         self._plain = [replay.motion(drive, model, ()) for drive in self._drives]
         self._columns: list[FloatArray] = []
         for drive, plain in zip(self._drives, self._plain, strict=True):
@@ -246,3 +255,80 @@ def _alike(one: FloatArray, other: FloatArray) -> float:
     if norms[1] == 0:
         return 1.0
     return float(one @ other) / (norms[0] * norms[1]) if norms[0] > _FAINT * norms[1] else 0.0
+
+
+class StartValues:
+    """First values; of what is rough, by the likelihood of what every size would explain."""
+
+    def __init__(self, problem: Problem, walked: Walked) -> None:
+        """Take what is fitted; walked: what sizes have been found to do, whatever the noise."""
+        self._problem, self._walked = problem, walked
+
+    @cached_property
+    def _likelihood(self) -> StepLikelihood:
+        return StepLikelihood(self._problem.drives, self._problem.model, self._problem.noise, self._walked)
+
+    def first(self, terms: Sequence[Term], start: Mapping[Key, float]) -> FloatArray:
+        """Return first values: those given; for others, one after the other, the best of some steps from null."""
+        lower = np.array([term.parameter.lower for term in terms])
+        upper = np.array([term.parameter.upper for term in terms])
+        values = np.array([start.get(term.key, term.null) for term in terms])
+        values = np.clip(values, lower, upper)
+        for i, term in enumerate(terms):
+            if term.key in start or term.shape or term.fixed:
+                continue
+            steps = [sign * n * term.step * term.parameter.scale for n in _STARTS for sign in (1, -1)]
+            values = self._best(terms, values, i) if term.rough else values
+            values = self._nearest(terms, values, i, [term.null + step for step in steps])
+        return values
+
+    def likeliest(self, terms: Sequence[Term], solution: least_squares.Solution) -> least_squares.Solution:
+        """Return a solution in which what is rough is where none close by is likelier.
+
+        The peak on which it began was the best one before the others were fitted.
+        """
+        rough = [i for i, term in enumerate(terms) if term.rough and not term.fixed]
+        for _ in range(_ROUNDS if rough else 0):
+            values = solution.values
+            for i in rough:
+                apart = self._likelihood.apart(terms[i], _form(terms, terms[i].id), float(values[i]))
+                for way in (apart, apart / _PLACES):
+                    values = self._nearest(terms, values, i, values[i] + way * np.linspace(-1.0, 1.0, _PLACES))
+            left = self._problem.residual(terms, values)
+            if 0.5 * float(solution.residual @ solution.residual - left @ left) < _BETTER:
+                break
+            again = least_squares.least_squares(self._problem, terms, values)
+            if again.cost >= solution.cost:
+                break
+            solution = again
+        return solution
+
+    def step_evidence(self, rough: Sequence[Term], terms: Sequence[Term], values: FloatArray) -> float:
+        """Return what the best peak of an effect with rough terms explains beside others, by lines, in nats."""
+        residual = self._problem.residuals(terms, values)
+        form = [term for term in rough if term.fixed]
+        starts = [self._likelihood.starts(term, form, residual) for term in rough if term.rough]
+        return max((found[0].nats for found in starts if found), default=0.0)
+
+    def _best(self, terms: Sequence[Term], values: FloatArray, i: int) -> FloatArray:
+        """Return values with the best peak of one of them, and the best place on it."""
+        starts = self._likelihood.starts(terms[i], _form(terms, terms[i].id), self._problem.residuals(terms, values))
+        if not starts or starts[0].nats < STEP_EVIDENCE:
+            return np.where(np.arange(len(values)) == i, starts[0].value if starts else values[i], values)
+        apart = {start.value: start.apart for start in starts}
+        found = self._nearest(terms, values, i, apart)
+        places = np.linspace(-1.0, 1.0, _PLACES) * apart.get(float(found[i]), 0.0)
+        return self._nearest(terms, found, i, found[i] + places[places != 0])
+
+    def _nearest(self, terms: Sequence[Term], values: FloatArray, i: int, guesses: Iterable[float]) -> FloatArray:
+        """Return values with the best of some guesses of one of them, or of itself where it is not null."""
+        p, own = terms[i].parameter, values[i]
+        inside = [guess for guess in guesses if p.lower <= guess <= p.upper]
+        inside += [own] if own != terms[i].null or not inside else []
+        tried = [np.where(np.arange(len(values)) == i, guess, values) for guess in inside]
+        return min(tried, key=lambda guess: float(np.sum(self._problem.residual(terms, guess) ** 2)))
+
+
+def _form(terms: Sequence[Term], name: str) -> list[Term]:
+    """Return the fixed terms that say in which form an effect acts."""
+    return [term for term in terms if term.id == name and term.fixed]

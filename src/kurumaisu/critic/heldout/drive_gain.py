@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, pieces, split
-from kurumaisu.critic.base.free_moments import free_columns
+from kurumaisu.critic.base.sensitivity import free_columns
 from kurumaisu.critic.heldout import noise_floor
 from kurumaisu.critic.heldout.materiality import spans
 from kurumaisu.critic.noise.base_noise import Noise, whitened

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.base.free_moments import all_free_columns
+from kurumaisu.critic.base.sensitivity import all_free_columns
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise

@@ -11,7 +11,7 @@ import numpy as np
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import Drive, prepare
-from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted_path
+from kurumaisu.critic.base.replay import PICTURE, RESTART, restarted_path
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.story import Overlay
 from kurumaisu.errors import Error

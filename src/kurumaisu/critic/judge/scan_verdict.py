@@ -22,13 +22,13 @@ from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
 from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
-from kurumaisu.critic.ranges.search.dominant_effect import dominant_effect, with_dominant
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior, FormSearch
-from kurumaisu.critic.ranges.search.large_effect import large_effect
+from kurumaisu.critic.ranges.search.large_effect import dominant_effect, large_effect, with_dominant
 from kurumaisu.critic.ranges.search.mean_effects import (
     MeanEffects,
     gain_of,
     mean_effects,
+    pose_curves_left,
     refitted,
     settled,
     with_doubt,
@@ -36,7 +36,6 @@ from kurumaisu.critic.ranges.search.mean_effects import (
 from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_rows
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
-from kurumaisu.critic.ranges.search.pose_curves_left import pose_curves_left
 from kurumaisu.critic.scatter.common_offset import own_sd
 from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED

@@ -6,19 +6,27 @@ Taking it from a table, or treating increments as independent, makes a critic na
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 from scipy.linalg import qr
+from scipy.optimize import minimize
 from scipy.special import expit
 
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.noise.minimiser import minimise
 from kurumaisu.critic.values.prior import occam
 from kurumaisu.types import FloatArray
+
+_STEP = 0.01  # of a difference
+_OPTIONS = {"ftol": 3e-6, "maxiter": 60}
+# Within so much of the lowest place, and no lower: a line search that comes back to where it began. By what has been
+# learnt of the cost there is no way down any more, and twenty more trials, with a gradient each, would end there, too.
+_BACK = 1e-5
+
+Cost = Callable[[FloatArray], float]
 
 
 @dataclass(frozen=True)
@@ -63,18 +71,9 @@ class Noise:
     def quick(self) -> Noise:
         """Return the noise without what lasts: within _BRIEF it is as loud."""
         first, second = (min(1.0, float(np.sqrt(_BRIEF / tau))) for tau in (self.tau, self.slow_tau))
-        return replace(
-            self,
-            sd_v=first * self.sd_v,
-            sd_lateral=first * self.sd_lateral,
-            sd_w=first * self.sd_w,
-            tau=min(self.tau, _BRIEF),
-            slow_v=second * self.slow_v,
-            slow_lateral=second * self.slow_lateral,
-            slow_w=second * self.slow_w,
-            slow_tau=min(self.slow_tau, _BRIEF) if self.slow_v else self.slow_tau,
-            lasting=0.0,
-        )
+        sizes = {name: (second if name in _SECOND else first) * getattr(self, name) for name in _GROWING}
+        slow_tau = min(self.slow_tau, _BRIEF) if self.slow_v else self.slow_tau
+        return replace(self, **sizes, tau=min(self.tau, _BRIEF), slow_tau=slow_tau, lasting=0.0)
 
 
 # Where the search for the noise starts, and how far from there a value remains plausible (natural log, 1 sd).
@@ -123,10 +122,7 @@ def whitener(drive: Drive, noise: Noise) -> Whitener:
         drive.pose_paths,
         position_sd=noise.position_sd * noise.louder,
         heading_sd=noise.heading_sd * noise.louder,
-        process_sd=[
-            [noise.sd_v, noise.sd_lateral, noise.sd_w],
-            [noise.slow_v, noise.slow_lateral, noise.slow_w],
-        ],
+        process_sd=[[noise.sd_v, noise.sd_lateral, noise.sd_w], [noise.slow_v, noise.slow_lateral, noise.slow_w]],
         process_tau=[noise.tau, noise.slow_tau],
         lasting=(noise.lasting / noise.louder) ** 2,
         lasting_tau=noise.lasting_tau,
@@ -224,7 +220,9 @@ class NoiseResiduals:
         gram = np.zeros(2 * (count + _PARTS * drives,))
         for i, (drive, columns) in enumerate(zip(self._drives, self._stacked, strict=True)):
             here = np.r_[:count, count + _PARTS * i : count + _PARTS * (i + 1)]
-            parts = most * turned(drive) * _parts(drive)
+            rows = len(drive.measured)
+            part = np.eye(_PARTS)[np.arange(rows) * _PARTS // max(rows, 1)]  # in which each row lies
+            parts = most * turned(drive) * np.repeat(part, 3, axis=0)
             gram[np.ix_(here, here)] += whitener(drive, noise).gram(np.column_stack([columns, parts]))
         free = np.zeros((len(gram), count - 1 + drives))  # effects, and each drive as a whole
         free[1:count, : count - 1] = np.eye(count - 1)
@@ -236,7 +234,10 @@ class NoiseResiduals:
         likelihood = 0.5 * np.sum(pulls * within / (1 + within * sizes) - np.log1p(within * sizes), axis=1)
         likely = within[likelihood > likelihood.max() - 0.5].max()
         length = float(np.median([drive.times[-1] - drive.times[0] for drive in self._drives]))
-        return most * min(float(np.sqrt(likely * _between(length))), 1.0)
+        # How much more what wanders varies between drives than within them, as a variance.
+        share = max(length, 1e-3) / _SLOWEST
+        mean = 2 / share * (1 - (1 - np.exp(-share)) / share)
+        return most * min(float(np.sqrt(likely * float(mean / (1 - mean)))), 1.0)
 
     def _as_known(self, noise: Noise) -> Noise:
         """Return noise with all errors of the reference as large as they are known to be, if they are."""
@@ -262,10 +263,7 @@ class NoiseResiduals:
         sizes = [name for name in _SECOND if name != "slow_tau"]
         tried = (
             replace(
-                one,
-                **{**slow, **{name: share * slow[name] for name in sizes}},
-                sd_v=k * one.sd_v,
-                sd_w=k * one.sd_w,
+                one, **{**slow, **{name: share * slow[name] for name in sizes}}, sd_v=k * one.sd_v, sd_w=k * one.sd_w
             )
             for share in _HINTS
             for k in (1.0, 0.85)
@@ -276,7 +274,9 @@ class NoiseResiduals:
     def growth(self, about: NoiseEstimate, prior_odds: float) -> NoiseGrowth:
         """Return how likely it is that the noise grows with the rates, about the estimate of noise that does not."""
         growing = min(
-            (self._best(start, names) for start, names in self._growing(about.noise)), key=_cost_of, default=about
+            (self._best(start, names) for start, names in self._growing(about.noise)),
+            key=attrgetter("cost"),
+            default=about,
         )
         better = max(about.cost - growing.cost, 0.0)
         nats = better - float(occam(np.sqrt(2 * better), sides=1))
@@ -325,20 +325,6 @@ def turned(drive: Drive) -> FloatArray:
     return np.asarray(np.stack([dy, -dx, np.zeros_like(dx)], axis=1).reshape(-1, 1))
 
 
-def _parts(drive: Drive) -> FloatArray:
-    """Return in which part of a drive each row lies, (3 m, parts) of 0 and 1."""
-    rows = len(drive.measured)
-    part = np.arange(rows) * _PARTS // max(rows, 1)
-    return np.repeat(np.eye(_PARTS)[part], 3, axis=0)
-
-
-def _between(length: float) -> float:
-    """Return how much more what wanders varies between drives of a length [s] than within them, as a variance."""
-    share = max(length, 1e-3) / _SLOWEST
-    mean = 2 / share * (1 - (1 - np.exp(-share)) / share)
-    return float(mean / (1 - mean))
-
-
 def _searched(noise: Noise) -> tuple[str, ...]:
     """Return what is searched for in noise of one colour."""
     rest = ("rest",) if noise.rest > START.rest else ()
@@ -350,10 +336,6 @@ def _growing_noise(noise: Noise, growth: float) -> Noise:
     return replace(noise, growth=growth, **{name: getattr(noise, name) / (1 + growth) for name in _GROWING})
 
 
-def _cost_of(estimate: NoiseEstimate) -> float:
-    return estimate.cost
-
-
 def _independent(columns: FloatArray) -> FloatArray:
     """Return which columns (rows, k) are not nearly made of others; so few that most rows are left for the noise."""
     norms = np.linalg.norm(columns, axis=0)
@@ -363,3 +345,49 @@ def _independent(columns: FloatArray) -> FloatArray:
     _, triangle, order = qr(columns[:, loud] / norms[loud], mode="economic", pivoting=True)
     sizes = np.abs(np.diag(triangle))
     return np.asarray(np.sort(loud[order[: len(sizes)][sizes > _SAME][: len(columns) // 3]]))
+
+
+class _StuckError(Exception):
+    pass
+
+
+def minimise(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float]:
+    """Return the place (k,) of a local minimum within bounds (k, 2), searched for from another, and its cost.
+
+    Where it is stuck it forgets what it has learnt, and begins anew from there, until that is of no use.
+    """
+    where, least = begin, np.inf
+    while True:
+        before, (where, least, stuck) = least, _attempt(cost, where, bounds)
+        if not stuck or before - least <= _OPTIONS["ftol"] * max(abs(least), 1.0):
+            return where, least
+
+
+def _attempt(cost: Cost, begin: FloatArray, bounds: FloatArray) -> tuple[FloatArray, float, bool]:
+    """Return the lowest place that was seen, its cost, and whether the search got stuck there."""
+    best, least = begin, np.inf
+
+    def with_gradient(at: FloatArray) -> tuple[float, FloatArray]:
+        nonlocal best, least
+        here = cost(at)
+        if here >= least and np.abs(at - best).max() < _BACK:
+            raise _StuckError
+        if here < least:
+            best, least = at.copy(), here
+        return here, _gradient(cost, at, here, bounds)
+
+    try:
+        found = minimize(with_gradient, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=_OPTIONS)
+    except _StuckError:
+        return best, least, True
+    return found.x, float(found.fun), False
+
+
+def _gradient(cost: Cost, at: FloatArray, here: float, bounds: FloatArray) -> FloatArray:
+    """Return the differences to neighbours, above where there is room."""
+    out = np.empty(len(at))
+    for i, upper in enumerate(bounds[:, 1]):
+        moved = at.copy()
+        moved[i] += _STEP if at[i] + _STEP <= upper else -_STEP
+        out[i] = (cost(moved) - here) / (moved[i] - at[i])
+    return out

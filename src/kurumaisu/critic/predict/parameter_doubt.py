@@ -10,7 +10,8 @@ import numpy as np
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
-from kurumaisu.critic.engine.evidence import Fit, Problem, covariance
+from kurumaisu.critic.engine.evidence import Fit, Problem
+from kurumaisu.critic.engine.least_squares import covariance
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
 from kurumaisu.critic.values.settings import Settings
 from kurumaisu.params import EffectSetting

@@ -55,20 +55,8 @@ class ScatterCurve:
         return EffectSetting(id_, self.basis.parameters(self.coefficients))
 
 
-@dataclass(frozen=True)
-class _Squares:
-    """Squares (..., n) of the readings that may count, 0 where they do not, and which do (..., n)."""
-
-    values: FloatArray
-    counted: BoolArray
-
-
-@dataclass(frozen=True)
-class _Pull:
-    """What speaks for a curve, laws of the noise left free: gram (m, m) and pull (m,) of twice its coefficients."""
-
-    gram: FloatArray
-    pull: FloatArray
+Squares = tuple[FloatArray, BoolArray]  # (..., n) of the readings that may count, 0 where they do not; and which do
+Pull = tuple[FloatArray, FloatArray]  # (m, m), (m,) what speaks for twice a curve's coefficients, laws left free
 
 
 class ScatterCurves:
@@ -88,7 +76,7 @@ class ScatterCurves:
 
     def run(self, beside: Sequence[EffectSetting]) -> list[ScatterCurve]:
         """Return the curve that acts beside effects, and the others behind it; none where there is too little."""
-        if not self._measured.counted.any():
+        if not self._measured[1].any():
             return []
         simulated = self._simulated(beside)
         found = [self._weighed(name, simulated) for name in self._curves]
@@ -123,18 +111,18 @@ class ScatterCurves:
             out.append((name, (replace(bare, priors=tuple(priors_of(knots, hats))), hats)))
         return out
 
-    def _squares(self, readings: FloatArray, error: FloatArray) -> _Squares:
+    def _squares(self, readings: FloatArray, error: FloatArray) -> Squares:
         values, counted = self._statistics.squares(readings, error)
-        return _Squares(np.where(counted, values, 0.0)[self._trust], (counted & self._trust)[self._trust])
+        return np.where(counted, values, 0.0)[self._trust], counted[self._trust]
 
-    def _simulated(self, settings: Sequence[EffectSetting]) -> _Squares:
+    def _simulated(self, settings: Sequence[EffectSetting]) -> Squares:
         each = [self._squares(*self._simulate.scans(settings, seed)) for seed in _SEEDS]
-        return _Squares(np.array([one.values for one in each]), np.array([one.counted for one in each]))
+        return np.array([values for values, _ in each]), np.array([counted for _, counted in each])
 
-    def _weighed(self, name: str, simulated: _Squares) -> ScatterCurve:
+    def _weighed(self, name: str, simulated: Squares) -> ScatterCurve:
         basis, _ = self._curves[name]
         speaks = self._pull(name, simulated, self._laws)
-        evidence = curve_evidence(speaks.gram, speaks.pull, basis.priors)
+        evidence = curve_evidence(*speaks, basis.priors)
         nats = evidence.nats + float(np.log(UNKNOWN_ODDS / len(self._curves)))
         return _stepped(ScatterCurve(basis, np.zeros(basis.size), evidence.prior, evidence.prior, nats, 0.0), speaks)
 
@@ -143,32 +131,33 @@ class ScatterCurves:
         simulated = self._simulated([*beside, one.setting])
         return _stepped(one, self._pull(one.basis.covariate, simulated, laws))
 
-    def _pull(self, name: str, simulated: _Squares, laws: FloatArray) -> _Pull:
+    def _pull(self, name: str, simulated: Squares, laws: FloatArray) -> Pull:
         """Return what the squares say of a curve, beyond those of simulations; laws (n, l): what is left free."""
-        measured, (_, hats) = self._measured, self._curves[name]
+        (measured, known), (values, counted), (_, hats) = self._measured, simulated, self._curves[name]
         columns = np.column_stack([laws, hats])
-        number = np.maximum(simulated.counted.sum(axis=0), 1)
-        mean, weight = simulated.values.sum(axis=0) / number, np.sqrt(simulated.counted.mean(axis=0))
+        number = np.maximum(counted.sum(axis=0), 1)
+        mean, weight = values.sum(axis=0) / number, np.sqrt(counted.mean(axis=0))
         fit = np.linalg.lstsq(columns * weight[:, np.newaxis], mean * weight, rcond=1e-9)[0]
         expected = np.maximum(columns @ fit, _LEAST * float(mean.mean()))
-        drawn = np.where(simulated.counted, simulated.values / expected - 1, 0.0)
-        seen = np.where(measured.counted, measured.values / expected - 1, 0.0)
-        chance = float(np.sum(drawn**2) / max(int(simulated.counted.sum()), 1))
-        gram = columns.T @ (columns * measured.counted[:, np.newaxis]) / chance
+        drawn = np.where(counted, values / expected - 1, 0.0)
+        seen = np.where(known, measured / expected - 1, 0.0)
+        chance = float(np.sum(drawn**2) / max(int(counted.sum()), 1))
+        gram = columns.T @ (columns * known[:, np.newaxis]) / chance
         pulls = np.vstack([seen - drawn.mean(axis=0), drawn - drawn.mean(axis=0)]) @ columns / chance
         free, own = slice(None, laws.shape[1]), slice(laws.shape[1], None)
         shares = np.linalg.solve(gram[free, free] + np.eye(laws.shape[1]) / _LAW**2, gram[free, own])
         gram, pulls = gram[own, own] - gram[own, free] @ shares, pulls[:, own] - pulls[:, free] @ shares
-        values, axes = np.linalg.eigh(gram)
-        use = values > 1e-3 * values[-1]
+        sizes, axes = np.linalg.eigh(gram)
+        use = sizes > 1e-3 * sizes[-1]
         count = len(_SEEDS)
-        along = (pulls[1:] @ axes[:, use]) ** 2 / values[use] * count / (count - 1)
+        along = (pulls[1:] @ axes[:, use]) ** 2 / sizes[use] * count / (count - 1)
         loud = max(float(along.mean()), 1.0) * (1 + 1 / count)
-        return _Pull(gram / loud, pulls[0] / loud)
+        return gram / loud, pulls[0] / loud
 
 
-def _stepped(one: ScatterCurve, speaks: _Pull) -> ScatterCurve:
+def _stepped(one: ScatterCurve, speaks: Pull) -> ScatterCurve:
     """Return a curve moved to where the squares beyond those with it, and its prior, draw it."""
-    twice, inner = 2 * one.coefficients, np.eye(one.basis.size) + one.prior @ speaks.gram
-    twice = twice + np.linalg.solve(inner, one.prior @ speaks.pull - twice)
+    gram, pull = speaks
+    twice, inner = 2 * one.coefficients, np.eye(one.basis.size) + one.prior @ gram
+    twice = twice + np.linalg.solve(inner, one.prior @ pull - twice)
     return replace(one, coefficients=twice / 2, covariance=np.linalg.solve(inner, one.prior) / 4)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 from scipy.special import logsumexp
@@ -49,12 +49,7 @@ class ScatterEffect:
     rivals: Mapping[str, float]
 
 
-def _cost(fitted: tuple[list[ScatterPiece], float]) -> float:
-    return fitted[1]
-
-
-def _nats(piece: ScatterPiece) -> float:
-    return piece.nats
+_cost, _nats = itemgetter(1), attrgetter("nats")  # of what was fitted; of a piece
 
 
 def _without_piece(pieces: Sequence[ScatterPiece], one: ScatterPiece) -> list[ScatterPiece]:
@@ -243,9 +238,7 @@ class ScatterSearch:
         if not like:
             return [*chosen, new]
         beside = [piece.setting for piece in rest]
-        group, cost = min(
-            [self._fit.together([*like, new], beside), *self._other_way(pushes, like, new, beside)], key=_cost
-        )
+        group, cost = self._fit.together([*like, new], beside)
         for old in like:
             fewer, more = min(self._without_it(pushes, _without_piece(group, old), beside), key=_cost)
             z = np.sqrt(max(2 * (more - cost), 0.0))
@@ -270,31 +263,6 @@ class ScatterSearch:
             known = (*beside, *(other.setting for other in others))
             one, cost = self._fit.alone(self._begun(pushes, piece, known), known)
             yield [*others, replace(piece, setting=one.setting, free=one.free)], cost
-
-    def _other_way(
-        self,
-        pushes: Sequence[StatisticsChange],
-        like: Sequence[ScatterPiece],
-        new: ScatterPiece,
-        beside: Sequence[EffectSetting],
-    ) -> Iterator[tuple[list[ScatterPiece], float]]:
-        """Yield fits of an effect and a new one as if the new one had come first, and their misfits.
-
-        Alone, one of several shapes had bent to do what the other does, too, from where no small step leads back.
-        """
-        for old in like:
-            first = next((rival for rival in old.rivals if rival.effect is new.effect), None)
-            others = [piece for piece in like if piece is not old]
-            known = (*beside, *(piece.setting for piece in others))
-            if first is None or len(old.free) < 2:
-                continue
-            there = (*known, first.setting)
-            piece, _ = self._fit.alone(self._begun(pushes, old, there), there)
-            both = (
-                replace(old, setting=piece.setting, free=piece.free),
-                replace(new, setting=first.setting, free=first.free),
-            )
-            yield self._fit.together([*others, *both], beside)
 
     def _polished(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
         """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""

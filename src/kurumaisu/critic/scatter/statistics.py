@@ -12,13 +12,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import (
-    GATE,
-    PILED,
-    cut_offs,
-    inside_ends,
-    without_cut_off,
-)
+from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_offs, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
@@ -102,7 +96,7 @@ class Statistics:
 
     def of(self, readings: FloatArray, error: FloatArray) -> FloatArray:
         """Return the numbers; readings (k, b) [m] as measured; error (k, b) [m]: off their mean, poses' errors in."""
-        ends, places = self._ends(readings)
+        ends, (low, high) = self._ends(readings)
         left, common = self._leftover(error, ends)
         inside, z, free, known = self._fluctuating(left)
         out = [_log(_mean(free[group & known] ** 2, 1.0)) for group in self._groups.masks]
@@ -118,8 +112,11 @@ class Statistics:
         out.append(_share(np.isinf(readings[self._trust])))
         out.append(_share(_once(self._edges.mixed(without_cut_off(readings, ends)), self._layout.stand)))
         said = readings[self._trust]
-        values = [_log(np.count_nonzero(_counts(said))), *_least_and_greatest(readings[self._read])]
-        return np.array([*out, *values, _log(_spacing(said) / _GRID), *self._piles(places)])
+        piled = _counts(readings[self._read])[[0, -1]].tolist()
+        values = [_log(np.count_nonzero(_counts(said))), *map(_root, piled)]
+        # The places at which readings are cut off, in units in which a step of them matters to nobody.
+        least, greatest = max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE
+        return np.array([*out, *values, _log(_spacing(said) / _GRID), least, greatest])
 
     def squares(self, readings: FloatArray, error: FloatArray) -> tuple[FloatArray, BoolArray]:
         """Return the squares (k, b) [1] of what differs from scan to scan, outliers cut, and where it is known (k, b).
@@ -144,7 +141,9 @@ class Statistics:
         """Return which of the numbers are roots of counts, which are places of piles, and which follow one another."""
         counts = np.array([one.count for one in self._told()])
         places = np.arange(len(counts)) >= len(counts) - _PLACES
-        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), self._folds(), self._alike())
+        folds = self._groups.folds
+        folds = np.asarray(np.r_[folds, np.zeros(len(counts) - len(folds))])
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), folds, self._alike())
 
     def _alike(self) -> FloatArray:
         """Return correlations of the numbers (m, m): one reading that is missing is so in all groups it belongs to."""
@@ -155,11 +154,6 @@ class Statistics:
         out = np.eye(len(told))
         out[np.ix_(counts, counts)] = masks @ masks.T
         return out
-
-    def _folds(self) -> FloatArray:
-        """Return the folds of the numbers that tell how far readings scatter: the first ones, by groups."""
-        known = self._groups.folds
-        return np.asarray(np.r_[known, np.zeros(len(self._told()) - len(known))])
 
     def of_errors(self) -> BoolArray:
         """Return which of the numbers follow how far readings are off their mean."""
@@ -205,14 +199,7 @@ class Statistics:
             return (low, farthest), (least, farthest)
         return (low, high), (least, greatest)
 
-    def _piles(self, places: tuple[float, float]) -> list[float]:
-        """Return the places [m] at which readings are cut off, in units in which a step of them matters to nobody."""
-        low, high = places
-        return [max(low, 0.0) / _PILE, min(high, self._farthest) / _PILE]
-
-    def _leftover(
-        self, error: FloatArray, ends: tuple[float, float] = (-np.inf, np.inf)
-    ) -> tuple[FloatArray, FloatArray]:
+    def _leftover(self, error: FloatArray, ends: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
         """Return what poses and common mode leave of the errors (k, b), and the common modes (k,), in deviations.
 
         ends [m]: where readings are cut off. What lies beyond, or may by an error of the pose, says nothing.
@@ -288,12 +275,10 @@ def _trends(told: Sequence[Statistic], kinds: Sequence[str]) -> FloatArray:
 
 def _cells(assembly: Assembly) -> IntArray:
     """Return the cell of the map (k, b) in which each beam ends, numbered."""
-    origins, bearings = assembly.origins()
-    angle = origins[:, :, 2] + bearings
-    ranges = np.nan_to_num(assembly.marks.seen.level, posinf=0.0)
-    ends = origins[:, :, :2] + ranges[:, :, np.newaxis] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    seen = assembly.marks.seen
+    ends = seen.ends(np.nan_to_num(seen.level, posinf=0.0))
     _, index = np.unique(np.floor(ends / _CELL).reshape(-1, 2), axis=0, return_inverse=True)
-    return np.asarray(index.reshape(ranges.shape))
+    return np.asarray(index.reshape(seen.level.shape))
 
 
 def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
@@ -324,12 +309,6 @@ def _counts(readings: FloatArray) -> IntArray:
     """Return how many readings have each value, from the least to the greatest."""
     steps = np.rint(readings[np.isfinite(readings)] / _GRID).astype(np.int64)
     return np.bincount(steps - steps.min()) if len(steps) else np.zeros(1, dtype=np.int64)
-
-
-def _least_and_greatest(readings: FloatArray) -> tuple[float, float]:
-    """Return how many readings have the least and the greatest value, as roots of counts."""
-    counts = _counts(readings)
-    return _root(int(counts[0])), _root(int(counts[-1]))
 
 
 def _spacing(readings: FloatArray) -> float:

@@ -16,10 +16,10 @@ from kurumaisu.critic.engine.catalogue import Candidate, settings_of
 from kurumaisu.critic.engine.covariance import orthonormal, without
 from kurumaisu.critic.engine.evidence import Beside, Fit, Problem
 from kurumaisu.critic.engine.form_error import SHARES
+from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, Design, curve_evidences
 from kurumaisu.critic.unknown.curves import columns as columns_of
-from kurumaisu.critic.unknown.fine_curves import fine_curves
-from kurumaisu.critic.unknown.step_curves import gains_over_own_rate, step_curves
+from kurumaisu.critic.unknown.step_curves import fine_curves, gains_over_own_rate, step_curves
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
@@ -64,10 +64,7 @@ class CurveSearch:
 
     def columns(self, fit: Fit, one: SetWithCurve) -> FloatArray:
         """Return whitened columns (rows, k) whose normal shares are a curve before the data."""
-        values, vectors = np.linalg.eigh(one.evidence.prior)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        free = self._columns(one.curve)
-        return np.asarray((free - fit.beside.own @ (fit.beside.own.T @ free)) @ root)
+        return np.asarray(without(fit.beside.own, self._columns(one.curve)) @ root_of(one.evidence.prior))
 
     def _columns(self, curve: Curve) -> FloatArray:
         """Return the whitened columns of a curve, (rows, k)."""
@@ -110,7 +107,10 @@ class CurveSearch:
         columns = design.columns
         pull = columns.T @ beside.residual
         share = float(np.log(UNKNOWN_ODDS / len(design.curves)))
-        shares = [(0.0, 0.0)] if not len(beside.missed.variances) else _weights(beside)
+        shares = [(0.0, 0.0)]
+        if len(beside.missed.variances):  # that equations may miss, with the log of their posterior at the fit
+            gains = np.array([beside.missed.scaled(share).gain(beside.residual) for share in SHARES])
+            shares = list(zip(SHARES, gains - logsumexp(gains), strict=True))
         totals, best = self._evidences(design, beside, pull, shares)
         found = []
         for curve, nats, evidence in zip(design.curves, totals, best, strict=True):
@@ -210,12 +210,6 @@ def _share(span: FloatArray, level: FloatArray, signal: FloatArray) -> float:
     left = without(level, signal[:, None])[:, 0]
     square = float(left @ left)
     return float(np.sum((span.T @ left) ** 2)) / square if square > _NO_LEVEL * float(signal @ signal) else 0.0
-
-
-def _weights(beside: Beside) -> list[tuple[float, float]]:
-    """Return shares that equations may miss with the log of their posterior at a fit."""
-    gains = [beside.missed.scaled(share).gain(beside.residual) for share in SHARES]
-    return list(zip(SHARES, np.array(gains) - logsumexp(gains), strict=True))
 
 
 def nearly_same_rates(problem: Problem, fit: Fit) -> bool:

@@ -23,6 +23,11 @@ _ROUNDING = 1e-6  # of a quantity's size: less spread is none
 _ORDERS = (1, 2)
 FINER = 4  # knots, or waves, for one
 _FINE = 3  # the same, of curves that the data may well bend so often
+OFFSET_CHANNELS = (
+    "v",
+    "lateral",
+    "w",
+)  # a share of a rate that is off by as much everywhere is a gain of the catalogue
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,19 @@ class Basis:
 
     def samples(self, motion: effects.Motion) -> FloatArray:
         """Return the covariate of a motion from its start on, (n,); inf where there is none yet."""
-        return _samples(self.covariate, self.constants, motion)
+        return np.asarray(effects.Follower(self.covariate, next(iter(self.constants.values()), 0.0)).values(motion))
 
     def matrix(self, at: FloatArray) -> FloatArray:
         """Return the basis at values of the covariate (n,), (n, k)."""
-        return _matrix(self.knots, self.constants.get("period", 0.0), at, self.harmonics)
+        if len(self.knots):
+            inside = np.clip(at, self.knots[0], self.knots[-1])
+            below = np.clip(np.searchsorted(self.knots, inside, side="right") - 1, 0, len(self.knots) - 2)
+            share = (inside - self.knots[below]) / (self.knots[below + 1] - self.knots[below])
+            rows, hats = np.arange(len(at)), np.zeros((len(at), len(self.knots)))
+            hats[rows, below], hats[rows, below + 1] = 1 - share, share
+            return hats
+        phase = np.multiply.outer(_TURN * at / self.constants.get("period", 0.0), np.arange(1, self.harmonics + 1))
+        return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
 
     def finer(self, times: int = FINER) -> Basis:
         """Return the curves over the same with that many knots for one, or waves, which hold these; without a prior."""
@@ -106,22 +119,16 @@ def bases(
     for name, constants, ways in asked:
         if measured and name == "since_command":
             continue
-        samples = [_samples(name, constants, motion) for motion in motions]
-        pooled = np.concatenate([values[motion.moving] for values, motion in zip(samples, motions, strict=True)])
+        bare = Basis(name, np.empty(0), constants, (), 0.0, 0.0, ways)
+        pooled = np.concatenate([bare.samples(motion)[motion.moving] for motion in motions])
         known = pooled[np.isfinite(pooled)]
         if len(known) < _FEWEST or np.ptp(known) <= _ROUNDING * max(1.0, float(np.abs(known).max())):
             continue
-        period = constants.get("period", 0.0)
-        knots = np.empty(0) if period else knots_of(known)
-        if not period and len(knots) < 3:
-            continue
-        matrix = _matrix(knots, period, pooled, _HARMONICS)
-        low, high = np.quantile(known, [0.025, 0.975])
-        yield Basis(name, knots, constants, tuple(priors_of(knots, matrix)), float(low), float(high), ways)
-
-
-def _samples(name: str, constants: dict[str, float], motion: effects.Motion) -> FloatArray:
-    return np.asarray(effects.Follower(name, next(iter(constants.values()), 0.0)).values(motion))
+        low, high = np.quantile(known, [0.025, 0.975]).tolist()
+        knots = np.empty(0) if "period" in constants else knots_of(known)
+        if "period" in constants or len(knots) >= 3:
+            basis = replace(bare, knots=knots, low=low, high=high)
+            yield replace(basis, priors=tuple(priors_of(knots, basis.matrix(pooled))))
 
 
 def _constants(name: str, drives: Sequence[Drive], model: Model) -> dict[str, float]:
@@ -150,16 +157,10 @@ def knots_of(values: FloatArray, hats: int = _HATS) -> FloatArray:
     return np.asarray(knots[keep])
 
 
-def _matrix(knots: FloatArray, period: float, at: FloatArray, harmonics: int) -> FloatArray:
-    if len(knots):
-        inside = np.clip(at, knots[0], knots[-1])
-        below = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
-        share = (inside - knots[below]) / (knots[below + 1] - knots[below])
-        rows, hats = np.arange(len(at)), np.zeros((len(at), len(knots)))
-        hats[rows, below], hats[rows, below + 1] = 1 - share, share
-        return hats
-    phase = np.multiply.outer(_TURN * at / period, np.arange(1, harmonics + 1))
-    return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
+def root_of(prior: FloatArray) -> FloatArray:
+    """Return R of a covariance R R' (k, k), or of several of them."""
+    values, vectors = np.linalg.eigh(prior)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
 def priors_of(knots: FloatArray, matrix: FloatArray) -> Iterator[FloatArray]:
@@ -187,3 +188,34 @@ def _walk(knots: FloatArray, order: int) -> FloatArray:
     s = (knots - knots[0]) / (knots[-1] - knots[0])
     low, high = np.minimum.outer(s, s), np.maximum.outer(s, s)
     return np.asarray(low if order == 1 else np.outer(s, s) + low**2 * (3 * high - low) / 6 * 4)
+
+
+@dataclass(frozen=True)
+class Offset(Basis):
+    """One number. What it is pictured over is the time, between low and high."""
+
+    @property
+    def size(self) -> int:
+        """Return the number of coefficients."""
+        return 1
+
+    def samples(self, motion: effects.Motion) -> FloatArray:
+        """Return the time since the start (n,) [s]."""
+        return effects.Follower("time", 0.0).values(motion)
+
+    def matrix(self, at: FloatArray) -> FloatArray:
+        """Return ones, (n, 1)."""
+        return np.ones((len(at), 1))
+
+    def finer(self, times: int = FINER) -> Basis:
+        """Return the same: a number has no knots between its knots."""
+        return self
+
+    def parameters(self, coefficients: FloatArray) -> dict[str, float]:
+        """Return the parameters as a model file has them."""
+        return {"knot_0": 0.0, "value_0": float(coefficients[0])}
+
+
+def constant_offset(seconds: float) -> Offset:
+    """Return the number, as known of drives of so many seconds."""
+    return Offset(effects.MOVING, np.empty(0), {}, (np.eye(1),), 0.0, seconds)

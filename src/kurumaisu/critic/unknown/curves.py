@@ -8,7 +8,7 @@ with eight.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,12 +17,9 @@ from scipy.special import logsumexp
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, edges_of
-from kurumaisu.critic.base.reference_sensitivity import reference_increments
-from kurumaisu.critic.base.sensitivity import Sensitivity
+from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.unknown.bases import Basis, bases
-from kurumaisu.critic.unknown.offset import OFFSET_CHANNELS, constant_offset
-from kurumaisu.critic.unknown.periods import wave_periods
+from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset, root_of
 from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -32,33 +29,10 @@ _SIZES = np.concatenate([np.geomspace(Z_LOW, Z_USUAL, 8), np.geomspace(Z_USUAL, 
 _LOG_WEIGHTS = np.log(np.concatenate([np.full(8, 0.9 / 8), np.full(4, 0.1 / 4)]))
 # What a rate's factor may follow: over the rate itself it would be the sum of a rate and a curve again, and so would
 # how the way bends over the speed.
+_OVER = ("v_times_w", "time", "since_command", "since_rest", "since_reversal", "heading", "distance", "x", "y")
 _BRAKES = {
-    "v_gain": (
-        "w",
-        "abs_w",
-        "v_times_w",
-        "time",
-        "since_command",
-        "since_rest",
-        "since_reversal",
-        "heading",
-        "distance",
-        "x",
-        "y",
-    ),
-    "w_gain": (
-        "v",
-        "abs_v",
-        "v_times_w",
-        "time",
-        "since_command",
-        "since_rest",
-        "since_reversal",
-        "heading",
-        "distance",
-        "x",
-        "y",
-    ),
+    "v_gain": ("w", "abs_w", *_OVER),
+    "w_gain": ("v", "abs_v", *_OVER),
     "curvature": ("time", "since_reversal", "heading", "x", "y"),
     "speed": ("time", "heading", "x", "y"),
 }
@@ -180,8 +154,7 @@ def _axes(gram: FloatArray, priors: Sequence[FloatArray] | FloatArray) -> tuple[
     """
     scaled = np.stack(list(priors))
     scaled = scaled / np.maximum(np.sum(gram * scaled, axis=(1, 2)), 1e-12)[:, None, None]
-    values, vectors = np.linalg.eigh(scaled)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
+    root = root_of(scaled)
     sizes, turns = np.linalg.eigh(root.transpose(0, 2, 1) @ gram @ root)
     return scaled, root @ turns, np.maximum(sizes, 0.0)
 
@@ -192,3 +165,102 @@ def _nats(sizes: FloatArray, c: FloatArray) -> FloatArray:
     weights, squares = _SIZES[:, None] ** 2 / spread, c**2
     gained = squares @ weights.T if sizes.ndim == 1 else (weights @ squares[..., None])[..., 0]
     return np.asarray(0.5 * (gained - np.log(spread).sum(axis=-1)))
+
+
+# Girths of casters and drive wheels, and more: a wheel out of round takes a share of the way, a bent caster turns the
+# chair. People who sway, pumps and fans; tiles, seams and ramps of a floor.
+# Of waves over a covariate the shortest and longest, in its unit, and in which channels they are looked for.
+Wave = tuple[float, float, tuple[str, ...]]
+WAVES: Mapping[str, Wave] = {
+    "distance": (0.3, 3.0, ("v_gain", "w")),
+    "time": (2.0, 60.0, ("v_gain", "w")),
+    "x": (0.3, 3.0, ("v_gain", "curvature")),
+    "y": (0.3, 3.0, ("v_gain", "curvature")),
+}
+_TURNS = 3.0  # in all of a drive, at least: fewer are a slope or a carpet
+_MOST = 150  # periods
+_AT_ONCE = 16  # of them: more leave the processor's cache
+_OVERTONES = 4
+_PARTS = (1, 2, 3)  # of a turn, after which it may be as large as after all of it
+_CLOSER = 8  # periods for one about the best: an overtone is out of step sooner
+
+
+def wave_periods(problem: Problem, settings: Sequence[EffectSetting]) -> dict[str, tuple[float, int]]:
+    """Return the period of waves over each covariate that explain most beside effects, and out of how many.
+
+    None of a covariate that no drive goes through often enough.
+    """
+    motions = [replay.motion(drive, problem.model, settings) for drive in problem.drives]
+    left = [drive.measured - problem.simulated(drive, settings) for drive in problem.drives]
+    white = [problem.whitened(drive, one.reshape(-1, 1))[:, 0] for drive, one in zip(problem.drives, left, strict=True)]
+    sensitive = [Sensitivity(drive, motion) for drive, motion in zip(problem.drives, motions, strict=True)]
+    found = {}
+    for name, kind in WAVES.items():
+        along = [effects.Follower(name, 0.0).values(motion) for motion in motions]
+        sought = _PeriodSearch(problem, list(zip(problem.drives, sensitive, along, white, strict=True)))
+        period = _wave_period(sought, kind, max((float(np.ptp(one)) for one in along if len(one)), default=0.0))
+        if period is not None:
+            found[name] = period
+    return found
+
+
+def _wave_period(sought: _PeriodSearch, kind: Wave, far: float) -> tuple[float, int] | None:
+    """Return the period that explains most, and out of how many; far: as a drive goes at most."""
+    shortest, longest, channels = kind
+    if far < _TURNS * shortest:
+        return None
+    low, high = max(1 / longest, _TURNS / far), 1 / shortest
+    waves = np.linspace(low, high, int(np.clip(2 * far * (high - low), 2, _MOST)))
+    gained = np.stack([sought.gained(channel, waves, 1) for channel in channels])
+    channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
+    # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
+    apart, closer = waves[1] - waves[0], np.arange(-_CLOSER, _CLOSER + 1) / _CLOSER
+    near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
+    near = [some[(some >= low) & (some <= high)] for some in near]
+    found = [(wave, sought.gained(channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
+    likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
+    return float(1 / likeliest), gained.size
+
+
+class _PeriodSearch:
+    """What is left about simulated drives, whitened, and what waves over a covariate explain of it."""
+
+    def __init__(self, problem: Problem, drives: Sequence[tuple[Drive, Sensitivity, FloatArray, FloatArray]]) -> None:
+        """Take drives with how they react, the covariate, and what is left."""
+        self._problem, self._drives = problem, drives
+
+    def gained(self, channel: str, waves: FloatArray, overtones: int) -> FloatArray:
+        """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,)."""
+        size = 2 * overtones
+        gram, pull = np.zeros((len(waves), size, size)), np.zeros((len(waves), size))
+        for drive, sensitivity, way, white in self._drives:
+            tones = zip(*(_waves(way, times * waves) for times in range(1, overtones + 1)), strict=True)
+            at = 0
+            for some in tones:
+                here = slice(at, at + some[0].shape[1] // 2)
+                at = here.stop
+                # (rows, waves, cosines and sines of all tones)
+                whole = [
+                    self._problem.whitened(drive, sensitivity.increments(channel, tone)).reshape(len(white), -1, 2)
+                    for tone in some
+                ]
+                both = whole[0] if overtones == 1 else np.concatenate(whole, axis=2)
+                gram[here] += np.einsum("nki,nkj->kij", both, both)
+                pull[here] += np.einsum("nki,n->ki", both, white)
+        along = np.linalg.solve(gram + 1e-9 * np.eye(size), pull[..., None])[..., 0]
+        return np.asarray(np.einsum("ki,ki->k", pull, along))
+
+
+def _waves(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
+    """Yield pairs of cosine and sine (n, 2 k) of evenly spaced waves along a way (n,), few at a time.
+
+    Each is the one before it, turned on by as much again.
+    """
+    first, apart = np.exp(2j * np.pi * np.multiply.outer([waves[0], waves[1] - waves[0]], way))
+    for at in range(0, len(waves), _AT_ONCE):
+        turned = np.empty((len(way), min(_AT_ONCE, len(waves) - at)), dtype=complex)
+        turned[:, 0] = first
+        turned[:, 1:] = apart[:, None]
+        np.cumprod(turned, axis=1, out=turned)
+        first = turned[:, -1] * apart
+        yield turned.view(np.float64)

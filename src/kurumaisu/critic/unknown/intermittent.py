@@ -17,8 +17,7 @@ from scipy.stats import norm
 
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, FreeMoments
-from kurumaisu.critic.base.free_moments import hats
-from kurumaisu.critic.base.sensitivity import Sensitivity
+from kurumaisu.critic.base.sensitivity import Sensitivity, hats
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.values.story import Moments
 from kurumaisu.geometry import interpolate
@@ -114,19 +113,14 @@ def _in_channel(problem: Problem, settings: Sequence[EffectSetting], channel: st
     order = np.argsort(-best.there, kind="stable")[: int(np.sum(best.there > _PLAUSIBLE))]
     spans = moments.middles[:, np.newaxis] + moments.width * np.array([-0.5, 0.5])
     surest = tuple((problem.drives[moments.drive[i]].name, float(spans[i, 0]), float(spans[i, 1])) for i in order)
-    samples = _samples(problem.drives, moments)
-    return Intermittent(channel, best.nats, best.share, size, surest, samples, moments.z / np.sqrt(moments.information))
-
-
-def _samples(drives: Sequence[Drive], moments: _Moments) -> Moments:
-    """Return when and where moments were."""
-    runs = tuple(dict.fromkeys(drive.name for drive in drives))
+    runs = tuple(dict.fromkeys(drive.name for drive in problem.drives))
+    run = np.array([runs.index(drive.name) for drive in problem.drives])[moments.drive]
     places = np.zeros((len(moments.z), 2))
-    for i, drive in enumerate(drives):
+    for i, drive in enumerate(problem.drives):
         own = moments.drive == i
         places[own] = interpolate(drive.times, drive.poses, moments.middles[own])[:, :2]
-    run = np.array([runs.index(drive.name) for drive in drives])[moments.drive]
-    return Moments(runs, run, moments.middles, places)
+    samples = Moments(runs, run, moments.middles, places)
+    return Intermittent(channel, best.nats, best.share, size, surest, samples, moments.z / np.sqrt(moments.information))
 
 
 def _moments(problem: Problem, settings: Sequence[EffectSetting], channel: str) -> _Moments:

@@ -12,7 +12,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.unknown.bases import Basis
+from kurumaisu.critic.unknown.bases import Basis, root_of
 from kurumaisu.critic.unknown.curves import Curve, columns, raw_columns
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -55,8 +55,7 @@ class FitWithCurve:
 def fit_with_curve(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) -> FitWithCurve:
     """Return a set's fit and a curve's coefficients, each beside the other."""
     curve = replace(curve, columns=slice(0, curve.basis.size))
-    values, vectors = np.linalg.eigh(prior)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = root_of(prior)
     extension = FitWithCurve(fit, curve, prior, np.zeros(curve.basis.size), prior)
     density = _log_density(problem, extension, root)
     for _ in range(_ROUNDS):
@@ -66,7 +65,9 @@ def fit_with_curve(problem: Problem, fit: Fit, curve: Curve, prior: FloatArray) 
             gained = _log_density(problem, moved, root) - density
             if gained > 0:
                 break
-        extension, density = (moved, density + gained) if gained > 0 else (_where(extension, whole), density)
+        # Where it is, with the doubts of where it would go.
+        doubted = replace(extension, fit=replace(extension.fit, sds=whole.fit.sds), covariance=whole.covariance)
+        extension, density = (moved, density + gained) if gained > 0 else (doubted, density)
         if gained < _ENOUGH:
             break
     return extension
@@ -82,15 +83,15 @@ def _log_density(problem: Problem, extension: FitWithCurve, root: FloatArray) ->
 
 def _part(problem: Problem, extension: FitWithCurve, whole: FitWithCurve, share: float) -> FitWithCurve:
     """Return an extension that is moved by a share of the way to another one."""
-    values = extension.fit.values + share * (whole.fit.values - extension.fit.values)
-    settings = replay.completed(problem.model, settings_of(extension.fit.terms, values))
+    fit = _at(problem, whole.fit, extension.fit.values + share * (whole.fit.values - extension.fit.values))
     coefficients = extension.coefficients + share * (whole.coefficients - extension.coefficients)
-    return replace(whole, fit=replace(whole.fit, values=values, settings=settings), coefficients=coefficients)
+    return replace(whole, fit=fit, coefficients=coefficients)
 
 
-def _where(extension: FitWithCurve, whole: FitWithCurve) -> FitWithCurve:
-    """Return an extension where it is, with the doubts of another one."""
-    return replace(extension, fit=replace(extension.fit, sds=whole.fit.sds), covariance=whole.covariance)
+def _at(problem: Problem, fit: Fit, values: FloatArray) -> Fit:
+    """Return a fit with other values."""
+    settings = replay.completed(problem.model, settings_of(fit.terms, values))
+    return replace(fit, values=values, settings=settings)
 
 
 def refitted(extension: FitWithCurve, drives: Sequence[Drive], problem: Problem) -> FitWithCurve:
@@ -109,9 +110,8 @@ def simulated_columns(problem: Problem, drive: Drive, extension: FitWithCurve) -
 
 def doubt(problem: Problem, drive: Drive, extension: FitWithCurve) -> FloatArray:
     """Return how a drive's increments change by errors of the curve, normal with sd 1 each, (3 m, k)."""
-    values, vectors = np.linalg.eigh(extension.covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(raw_columns(drive, problem.model, extension.fit.settings, [extension.curve]) @ root)
+    own = raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])
+    return np.asarray(own @ root_of(extension.covariance))
 
 
 def _step(problem: Problem, extension: FitWithCurve, root: FloatArray) -> FitWithCurve:
@@ -139,8 +139,6 @@ def _moved(problem: Problem, fit: Fit, steps: FloatArray, covariance: FloatArray
     if not fit.terms:
         return fit
     unit = np.array([term.step * term.parameter.scale for term in fit.terms])
-    lower = np.array([term.parameter.lower for term in fit.terms])
-    upper = np.array([term.parameter.upper for term in fit.terms])
+    lower, upper = np.array([(term.parameter.lower, term.parameter.upper) for term in fit.terms]).T
     values = np.clip(fit.values + steps * unit, lower, upper)
-    settings = replay.completed(problem.model, settings_of(fit.terms, values))
-    return replace(fit, values=values, sds=np.sqrt(np.diag(covariance)[: len(unit)]) * unit, settings=settings)
+    return replace(_at(problem, fit, values), sds=np.sqrt(np.diag(covariance)[: len(unit)]) * unit)

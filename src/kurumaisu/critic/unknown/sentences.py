@@ -98,15 +98,10 @@ def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
 
 def headline(extension: FitWithCurve) -> str:
     """Return the finding in one sentence."""
-    channel_name, name = CHANNEL_NAMES[extension.curve.channel], covariate(extension.curve)[1]
-    if extension.curve.basis.covariate == effects.MOVING:
-        return (
-            f"No effect in the catalogue explains the error of the {channel_name}. "
-            f"It follows no known quantity: {shape(extension, intervals=False)}."
-        )
+    name = "no known quantity" if followed(extension.curve) == "constant" else f"the {covariate(extension.curve)[1]}"
     return (
-        f"No effect in the catalogue explains the error of the {channel_name}. It follows the "
-        f"{name}: {shape(extension, intervals=False)}."
+        f"No effect in the catalogue explains the error of the {CHANNEL_NAMES[extension.curve.channel]}. "
+        f"It follows {name}: {shape(extension, intervals=False)}."
     )
 
 

@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 from typing import Protocol
 
 import numpy as np
 
-from kurumaisu.critic.unknown.bases import Basis
-from kurumaisu.critic.unknown.offset import Offset
+from kurumaisu.critic.unknown.bases import Basis, Offset
 from kurumaisu.critic.unknown.step_curves import StepCurve
 from kurumaisu.types import FloatArray
 
@@ -20,20 +20,15 @@ _PLACES = 25  # of a template along the covariate
 _TURN = 2 * np.pi
 
 
-class DescribedCurve(Protocol):
+class _Described(Protocol):
     """A curve over a covariate: basis, coefficients (m,) and their covariance (m, m)."""
 
     @property
-    def basis(self) -> Basis:
-        """Return its basis of m functions."""
-
+    def basis(self) -> Basis: ...
     @property
-    def coefficients(self) -> FloatArray:
-        """Return its coefficients."""
-
+    def coefficients(self) -> FloatArray: ...
     @property
-    def covariance(self) -> FloatArray:
-        """Return their covariance."""
+    def covariance(self) -> FloatArray: ...
 
 
 @dataclass(frozen=True)
@@ -50,40 +45,22 @@ class Shape:
     size: FloatArray
 
 
-def _line(x: FloatArray, _: float) -> FloatArray:
-    return x
-
-
-def _step(x: FloatArray, at: float) -> FloatArray:
-    return np.asarray(1 / (1 + np.exp(np.clip(-(x - at) / 0.05, -50, 50))))
-
-
-def _ramp_above(x: FloatArray, at: float) -> FloatArray:
-    return np.asarray(np.maximum(x - at, 0.0) / max(1 - at, 1e-9))
-
-
-def _ramp_below(x: FloatArray, at: float) -> FloatArray:
-    return np.asarray(np.maximum(at - x, 0.0) / max(at, 1e-9))
-
-
-def _narrow(x: FloatArray, at: float) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * ((x - at) / 0.1) ** 2))
-
-
-def _wide(x: FloatArray, at: float) -> FloatArray:
-    return np.asarray(np.exp(-0.5 * ((x - at) / 0.22) ** 2))
-
-
-# Over a covariate from 0 to 1; each with a level and a factor besides its place.
+# Over a covariate x from 0 to 1, about a place in it; each with a level and a factor besides.
 TEMPLATES: dict[str, tuple[Callable[[FloatArray, float], FloatArray], ...]] = {
-    "line": (_line,),
-    "step": (_step,),
-    "threshold": (_ramp_above, _ramp_below),
-    "bump": (_narrow, _wide),
+    "line": (lambda x, _: x,),
+    "step": (lambda x, at: 1 / (1 + np.exp(np.clip(-(x - at) / 0.05, -50, 50))),),
+    "threshold": (
+        lambda x, at: np.maximum(x - at, 0.0) / max(1 - at, 1e-9),
+        lambda x, at: np.maximum(at - x, 0.0) / max(at, 1e-9),
+    ),
+    "bump": (
+        lambda x, at: np.exp(-0.5 * ((x - at) / 0.1) ** 2),
+        lambda x, at: np.exp(-0.5 * ((x - at) / 0.22) ** 2),
+    ),
 }
 
 
-def grid(described: DescribedCurve) -> FloatArray:
+def grid(described: _Described) -> FloatArray:
     """Return values of the covariate at which its curve is known."""
     basis = described.basis
     if isinstance(basis, Offset):
@@ -96,31 +73,31 @@ def grid(described: DescribedCurve) -> FloatArray:
     return np.linspace(0.0, basis.constants["period"], _POINTS, endpoint=False)
 
 
-def band(described: DescribedCurve, at: FloatArray) -> FloatArray:
+def band(described: _Described, at: FloatArray) -> FloatArray:
     """Return the curve and its standard deviation at values of the covariate, (2, n)."""
     matrix = described.basis.matrix(at)
     variance = np.einsum("ij,jk,ik->i", matrix, described.covariance, matrix)
     return np.stack([matrix @ described.coefficients, np.sqrt(np.maximum(variance, 0.0))])
 
 
-def shape_of(described: DescribedCurve) -> Shape:
+def shape_of(described: _Described) -> Shape:
     """Return the template that describes the curve best, with intervals from draws of its coefficients."""
     at = grid(described)
-    draws = np.random.default_rng(0).multivariate_normal(
-        described.coefficients, described.covariance, size=_DRAWS, check_valid="ignore"
-    )
-    curves = np.vstack([described.coefficients, draws]) @ described.basis.matrix(at).T
+    mean, rng = described.coefficients, np.random.default_rng(0)
+    drawn = rng.multivariate_normal(mean, described.covariance, size=_DRAWS, check_valid="ignore")
+    every = np.vstack([mean, drawn])
+    curves = every @ described.basis.matrix(at).T
     if isinstance(described.basis, Offset):
         return Shape("constant", np.full(3, (at[0] + at[-1]) / 2), _interval(curves[:, 0]))
     if not len(described.basis.knots):
-        return _periodic(described, np.vstack([described.coefficients, draws]))
+        return _periodic(described, every)
     if isinstance(described.basis, StepCurve):
-        return Shape(
-            "jump", described.basis.place, _interval(np.diff(np.vstack([described.coefficients, draws]))[:, 0])
-        )
+        return Shape("jump", described.basis.place, _interval(np.diff(every)[:, 0]))
     x = (at - at[0]) / (at[-1] - at[0])
     noise = float(np.mean(curves[1:].var(axis=0)))
-    kind = min(TEMPLATES, key=lambda name: _cost(name, x, curves[0], noise))
+    # Each of a kind's places is a parameter more than a line has.
+    costs = {k: np.log(_best(k, x, curves[0])[2] + noise) * 8 + (k != "line") * np.log(8) for k in TEMPLATES}
+    kind = min(costs, key=lambda name: costs[name])
     fitted = [_best(kind, x, curve) for curve in curves]
     sizes = np.array([size for _, size, _ in fitted])
     if kind == "line" and np.diff(np.sign(_interval(sizes)[1:])):  # neither rises nor falls: none of the templates
@@ -129,7 +106,7 @@ def shape_of(described: DescribedCurve) -> Shape:
     return Shape(kind, at[0] + (at[-1] - at[0]) * _interval(places), _interval(sizes))
 
 
-def _periodic(described: DescribedCurve, coefficients: FloatArray) -> Shape:
+def _periodic(described: _Described, coefficients: FloatArray) -> Shape:
     """Return the strongest harmonic."""
     count = (coefficients.shape[1] - 1) // 2
     sizes = np.hypot(coefficients[:, 1 : 1 + count], coefficients[:, 1 + count :])
@@ -143,23 +120,14 @@ def _interval(values: FloatArray) -> FloatArray:
     return np.array([values[0], *np.quantile(values[1:], [0.05, 0.95])])
 
 
-def _cost(kind: str, x: FloatArray, curve: FloatArray, noise: float) -> float:
-    """Return how badly a kind describes a curve; each of its places is a parameter more than a line has."""
-    left = _best(kind, x, curve)[2]
-    return float(np.log(left + noise) * 8 + (0 if kind == "line" else np.log(8)))
-
-
 def _best(kind: str, x: FloatArray, curve: FloatArray) -> tuple[float, float, float]:
     """Return place, size and mean squared misfit of the best template of a kind."""
-    return min(_fits(kind, x, curve), key=lambda fit: fit[2])
-
-
-def _fits(kind: str, x: FloatArray, curve: FloatArray) -> Iterator[tuple[float, float, float]]:
     y = curve - curve.mean()
     places = (0.5,) if kind == "line" else np.linspace(0.06, 0.94, _PLACES)
-    for template in TEMPLATES[kind]:
-        for place in places:
-            t = template(x, float(place))
-            t = t - t.mean()
-            size = float(t @ y) / max(float(t @ t), 1e-12)
-            yield float(place), size, float(np.mean((y - size * t) ** 2))
+    fits = []
+    for template, place in product(TEMPLATES[kind], places):
+        t = template(x, float(place))
+        t = t - t.mean()
+        size = float(t @ y) / max(float(t @ t), 1e-12)
+        fits.append((float(place), size, float(np.mean((y - size * t) ** 2))))
+    return min(fits, key=lambda fit: fit[2])

@@ -12,7 +12,7 @@ from kurumaisu import geometry
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates
 from kurumaisu.critic.base.drive import prepare
-from kurumaisu.critic.base.restarted_path import PICTURE, RESTART, restarted_path
+from kurumaisu.critic.base.replay import PICTURE, RESTART, restarted_path
 from kurumaisu.critic.ranges.scans.gathering import laser_of
 from kurumaisu.critic.ranges.scans.walls import Rays, walls_at
 from kurumaisu.critic.values.recording import Run, Series

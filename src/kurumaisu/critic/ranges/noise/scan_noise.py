@@ -88,7 +88,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
     none = np.where(np.isin(np.arange(7), (4, 5)), np.log(_NONE), usual)
     found = _likeliest(likelihood, none, np.arange(known, 4), stated=truth is not None)
     here = likelihood(found)
-    wandering = [_wandering(found, size, size, stated=truth is not None) for size in _TRIED]
+    wandering = [_wandering(found, size, stated=truth is not None) for size in _TRIED]
     begun = min(wandering, key=likelihood)
     if likelihood(begun) > here:
         return found
@@ -105,7 +105,7 @@ def beyond_stated(
     """
     likelihood, usual = _Likelihood(grams, layout, project), np.log(_USUAL)
     usual[:2] = np.log(np.maximum(truth, 1e-5))
-    begun = [_wandering(noise, size, size, stated=False) for size in (max(noise.lasting, _NONE), *_TRIED)]
+    begun = [_wandering(noise, size, stated=False) for size in (max(noise.lasting, _NONE), *_TRIED)]
     at = np.log(astuple(min(begun, key=likelihood)))
     free = _likeliest(likelihood, usual, np.arange(7), at)
     far = (np.log(astuple(free)) - usual) / _SPREAD
@@ -176,18 +176,18 @@ def common_mode(
     return CommonMode(likelihood(none) - here - 0.5 * float(np.log(values).sum()), float(sds[0]), float(sds[1]))
 
 
-def _wandering(noise: ScanNoise, lasting: float, turn: float, *, stated: bool) -> ScanNoise:
+def _wandering(noise: ScanNoise, lasting: float, *, stated: bool) -> ScanNoise:
     """Return a noise of which so much lasts; stated: of what is said of the reference, which is all of its errors."""
     position, heading = 1.0, 1.0
     if stated:
         position = float(np.hypot(1.0, noise.lasting) / np.hypot(1.0, lasting))
-        heading = float(np.hypot(1.0, noise.lasting_turn) / np.hypot(1.0, turn))
+        heading = float(np.hypot(1.0, noise.lasting_turn) / np.hypot(1.0, lasting))
     return replace(
         noise,
         position_sd=position * noise.position_sd,
         heading_sd=heading * noise.heading_sd,
         lasting=lasting,
-        lasting_turn=turn,
+        lasting_turn=lasting,
     )
 
 
@@ -209,7 +209,7 @@ def _likeliest(
         every[free] = np.clip(values, np.log(_LOW)[free], np.log(_HIGH)[free])
         found = ScanNoise(*(float(value) for value in np.exp(every)))
         none = replace(found, lasting=0.0, lasting_turn=0.0)
-        return _wandering(none, found.lasting, found.lasting, stated=True) if stated else found
+        return _wandering(none, found.lasting, stated=True) if stated else found
 
     def cost(values: FloatArray) -> float:
         distance = (values - usual[free]) / _SPREAD[free]

@@ -72,6 +72,17 @@ class BeamHits:
     beams: tuple[Beams, ...]
     origins: FloatArray
 
+    @property
+    def bearings(self) -> FloatArray:
+        """Return the bearings (k, b) [rad] at which the beams leave the laser."""
+        return np.array([each.bearings for each in self.beams])
+
+    def ends(self, ranges: FloatArray) -> FloatArray:
+        """Return where (k, b, 2) [m] beams of some ranges (k, b) [m] end in the map."""
+        angles = self.origins[:, :, 2] + self.bearings
+        way = ranges[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        return np.asarray(self.origins[:, :, :2] + way)
+
 
 def model_effects_with(shots: Shots, settings: Sequence[EffectSetting]) -> tuple[EffectSetting, ...]:
     """Return the model's own effects with these in place of those of the same id."""
@@ -103,7 +114,7 @@ def hits_of(
     for effect in effects.build_world(every, np.random.default_rng([seed, 1])):
         segments = effect.apply(segments)
     rays = Rays(replace(shots.walls, segments=segments))
-    beams = [chain.aim(_stated_beams(shots, scan)) for scan in range(len(shots.stamps))]
+    beams = [chain.aim(stated_beams(shots, scan)) for scan in range(len(shots.stamps))]
     poses = poses_at(shots, np.array([each.times for each in beams]))
     if shift is not None:
         poses = poses + shift
@@ -118,13 +129,7 @@ def hits_of(
     return BeamHits(ranges, level, angles, returns.reshape(shape), tuple(beams), placed)
 
 
-def firing_times(shots: Shots, scan: int) -> FloatArray:
-    """Return when the beams (b,) [s] of a scan leave by the model, its own effects at work."""
-    chain = effects.build_laser(shots.own, np.random.default_rng(0))
-    return chain.aim(_stated_beams(shots, scan)).times
-
-
-def _stated_beams(shots: Shots, scan: int) -> Beams:
+def stated_beams(shots: Shots, scan: int) -> Beams:
     """Return the beams of a scan as its message says."""
     place, stamp, bearings = shots.laser.mount, float(shots.stamps[scan]), shots.laser.bearings
     mount = np.array([place.x, place.y, place.yaw])

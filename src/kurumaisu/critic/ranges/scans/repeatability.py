@@ -78,9 +78,11 @@ def sentences(recording: Recording, model: Model) -> tuple[str, ...]:
             told.append(f"{run.name}: {error}")
             continue
         for low, high in _ROOMS:
-            if np.sum((found.ranges >= low) & (found.ranges < high)) >= _FEW_BEAMS:
-                at = float(np.median(found.ranges[(found.ranges >= low) & (found.ranges < high)]))
-                measured, said = 1e3 * found.sd_between(low, high), 1e3 * _model_sd(model, at)
+            here = found.ranges[(found.ranges >= low) & (found.ranges < high)]
+            if len(here) >= _FEW_BEAMS:
+                at, law = float(np.median(here)), model.laser.error  # equation (4)
+                measured = 1e3 * found.sd_between(low, high)
+                said = 1e3 * float(law.deviation(law.range(np.array([at])))[0])
                 told.append(
                     f"{run.name}: readings around {at:.2g} m scatter by {measured:.1f} mm, the model's by {said:.1f} mm"
                 )
@@ -91,8 +93,3 @@ def sentences(recording: Recording, model: Model) -> tuple[str, ...]:
             f"{found.missing:.1%} of the readings are missing"
         )
     return tuple(told)
-
-
-def _model_sd(model: Model, at: float) -> float:
-    """Return the sd [m] that the model gives readings around a distance [m], by equation (4)."""
-    return float(model.laser.error.deviation(model.laser.error.range(np.array([at])))[0])

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from kurumaisu import geometry
-from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, firing_times
+from kurumaisu import effects, geometry
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, stated_beams
 from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -27,6 +27,11 @@ _MICRON = 6  # decimals of a metre: readings a grid apart are not within it, how
 _GRIDS = (1e-3, 4e-3)  # [m] within which values are one; a cut-off need not be sharp
 _WIDEST = 32e-3  # [m] likewise, as readings scatter, at a far end where the map has most walls beyond
 _BEYOND = 0.5  # share of a pile that most are
+_MILLIMETRE = 1e-3  # [m] to which a message rounds
+_COARSE = 2.5  # millimetres from which a grid is not that of the message
+_ADJACENT = 1.5  # usual steps up to which two values are neighbours
+_ROUNDED = 0.65  # millimetres that values may be off a regular grid: half of one by rounding, and what is fitted
+_FEWEST = 20  # values that tell a grid
 
 
 def edges(seen: BeamHits, increment: float, reach: float = 0.0) -> BoolArray:
@@ -63,7 +68,7 @@ def usable_beams(shots: Shots, seen: BeamHits, base: FloatArray, reach: float = 
 def _edges_between(shots: Shots, seen: BeamHits, reach: float) -> BoolArray:
     """Return the same as edges of a fan whose beams are too far apart to tell what is beside each of them."""
     rays, origins = Rays(shots.walls), seen.origins.reshape(-1, 3)
-    bearings = np.concatenate([each.bearings for each in seen.beams])
+    bearings = seen.bearings.ravel()
     with np.errstate(divide="ignore", invalid="ignore"):
         aside = _BESIDE + reach / np.nan_to_num(seen.level.ravel(), posinf=np.inf)
         right, near, left = (1 / rays.cast(origins, bearings + side * aside)[0] for side in (-1.0, 0.0, 1.0))
@@ -164,9 +169,38 @@ class PoseWeights:
 def pose_weights(shots: Shots, scan: int) -> PoseWeights:
     """Return on which reference poses a scan rests: those around the times at which its beams leave by the model."""
     track = shots.tracks[shots.run[scan]]
-    times = firing_times(shots, scan)
+    times = effects.build_laser(shots.own, np.random.default_rng(0)).aim(stated_beams(shots, scan)).times
     last = len(track.times) - 1
     first = min(max(int(np.searchsorted(track.times, times.min(), side="right")) - 1, 0), last)
     rows = slice(first, min(max(int(np.searchsorted(track.times, times.max())), first), last) + 1)
     knots = track.times[rows]
     return PoseWeights(rows, np.stack([np.interp(times, knots, unit) for unit in np.eye(len(knots))], axis=-1))
+
+
+def grid_step(measured: FloatArray) -> float:
+    """Return the usual step [m] between the values that readings have, to a millimetre."""
+    values = np.unique(np.rint(measured[np.isfinite(measured)] / _MILLIMETRE))
+    return _MILLIMETRE * float(np.median(np.diff(values))) if len(values) > 1 else _MILLIMETRE
+
+
+def unrounded(measured: FloatArray) -> FloatArray:
+    """Return readings [m] as a coarse grid has them, where there is one, before a message rounded its values.
+
+    A grid of 9.97 mm beats with one of 1 mm: over 0.4 m of the range the message is off by half a millimetre either
+    way, which is no wave of the laser's.
+    """
+    if grid_step(measured) < _COARSE * _MILLIMETRE:
+        return measured
+    known = np.isfinite(measured)
+    values, index = np.unique(np.rint(measured[known] / _MILLIMETRE), return_inverse=True)
+    if len(values) < _FEWEST:
+        return measured
+    steps = np.diff(values)
+    near = steps[steps < _ADJACENT * np.median(steps)]
+    places = np.concatenate([[0.0], np.cumsum(np.rint(steps / near.mean()))])
+    even = np.polyval(np.polyfit(places, values, 1), places)
+    if np.abs(even - values).max() > _ROUNDED:
+        return measured
+    out = measured.copy()
+    out[known] = _MILLIMETRE * even[index]
+    return out

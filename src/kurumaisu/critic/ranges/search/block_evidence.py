@@ -15,6 +15,7 @@ from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
+from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
 from kurumaisu.critic.values.prior import UNKNOWN_ODDS, odds
 from kurumaisu.types import FloatArray, IntArray
@@ -116,7 +117,7 @@ def compare_blocks(
     families: what equations may miss, whose columns are in the gram, too.
     """
     doubted = _Doubted(gram, families)
-    tried = [doubted.fit(fit) for fit in _tried(found.fits)]
+    tried = [doubted.made(fit)[0] for fit in _tried(found.fits)]
     other = [fit for fit in found.fits if all(fit.forms != one.forms for one in tried)]
     found = replace(found, fits=tuple(sorted([*tried, *other], key=lambda fit: -fit.score)))
     ids = tuple(dict.fromkeys([*found.p, *(each.id for each in free if each.basis is None)]))
@@ -126,7 +127,7 @@ def compare_blocks(
     known = {fit.ids: fit for fit in reversed(found.fits)}
     rivals = []
     for fit in tried:
-        own = doubted.gram(fit)
+        own = doubted.made(fit)[1]
         rivals += [_with_block(fit, each, own, shares[each.id]) for each in free if each.id not in fit.ids]
     rivals.sort(key=lambda rival: -rival.log_posterior)
     rivals = [*_pruned(rivals[:_PRUNED], known, doubted, shares), *rivals]
@@ -139,20 +140,21 @@ def compare_blocks(
     curved = [rival for rival in rivals if rival.unknown]
     total = logsumexp([*(score for _, score in plain), *(rival.log_posterior for rival in curved)])
     sets = [*plain, *((rival.fit.ids, rival.log_posterior) for rival in curved)]
-    weights = [(ids, float(np.exp(score - total))) for ids, score in sets]
     best = max(plain, key=lambda each: each[1])
-    p, confounded = confusion(weights, best[0], ids)
+
+    def weighed(sets: Sequence[tuple[frozenset[str], float]], total: float) -> FormPosterior:
+        p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in sets], best[0], ids)
+        return replace(found, p=p, confounded=confounded)
+
     lead = curved[0].log_posterior - best[1] if curved else -np.inf
     by_curve = {each.id: 0.0 for each in free if each.basis is not None}
     for rival in curved:
         by_curve[rival.free.id] += float(np.exp(rival.log_posterior - total))
-    made = BlockComparison(replace(found, p=p, confounded=confounded), tuple(rivals), lead, by_curve)
+    made = BlockComparison(weighed(sets, total), tuple(rivals), lead, by_curve)
     if lead > made.least:
         return made
     # A curve that does not lead by enough takes nothing from the effects that it imitates.
-    total = logsumexp([score for _, score in plain])
-    p, confounded = confusion([(names, float(np.exp(score - total))) for names, score in plain], best[0], ids)
-    return replace(made, found=replace(found, p=p, confounded=confounded))
+    return replace(made, found=weighed(plain, logsumexp([score for _, score in plain])))
 
 
 class _Doubted:
@@ -162,15 +164,11 @@ class _Doubted:
         self._gram, self._families = gram, families
         self._known: dict[tuple[int, ...], tuple[FittedForms, FloatArray]] = {}
 
-    def fit(self, fit: FittedForms) -> FittedForms:
-        """Return a fit with the evidence that it has then; of which share of a signal is missed, each is as likely."""
-        return self._made(fit)[0]
+    def made(self, fit: FittedForms) -> tuple[FittedForms, FloatArray]:
+        """Return a fit with the evidence that it has then, and the normal equations in the likeliest of these noises.
 
-    def gram(self, fit: FittedForms) -> FloatArray:
-        """Return the normal equations in the likeliest of these noises."""
-        return self._made(fit)[1]
-
-    def _made(self, fit: FittedForms) -> tuple[FittedForms, FloatArray]:
+        Of which share of a signal is missed, each is as likely.
+        """
         key = tuple(form.start for form in fit.forms)
         if key not in self._known:
             self._known[key] = self._weighed(fit)
@@ -232,9 +230,9 @@ def _pruned(
         best = rival
         while True:
             fewer = [best.fit.ids - {name} for name in best.fit.ids]
-            fits = [doubted.fit(known[ids]) for ids in fewer if ids in known and (ids, best.free.id) not in done]
-            done |= {(fit.ids, best.free.id) for fit in fits}
-            tried = [_with_block(fit, best.free, doubted.gram(fit), shares[best.free.id]) for fit in fits]
+            made = [doubted.made(known[ids]) for ids in fewer if ids in known and (ids, best.free.id) not in done]
+            done |= {(fit.ids, best.free.id) for fit, _ in made}
+            tried = [_with_block(fit, best.free, own, shares[best.free.id]) for fit, own in made]
             yield from tried
             top = max(tried, key=lambda each: each.log_posterior, default=best)
             if top.log_posterior <= best.log_posterior:
@@ -244,8 +242,7 @@ def _pruned(
 
 def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, FloatArray, FloatArray]:
     """Return the forms fitted beside the block, and the block's coefficients (m,) and their covariance (m, m)."""
-    values, vectors = np.linalg.eigh(rival.evidence.prior)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = root_of(rival.evidence.prior)
     fixed, own = _use(rival.fit), np.arange(rival.free.span.start, rival.free.span.stop)
     use = np.concatenate([fixed, own])
     turn = np.eye(len(use))

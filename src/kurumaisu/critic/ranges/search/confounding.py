@@ -6,7 +6,8 @@ The evidence may prefer one of them for its usual size or its fewer parameters, 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
@@ -40,17 +41,14 @@ def confounded(
             else:
                 own = _log_posterior(found.best)
             group |= {other for other, nats in _alternatives(found, fits, blocks, gram) if own - nats < _LOSS}
-        for known in [known for known in groups if known & group]:
-            groups.remove(known)
-            group |= known
         groups.append(group)
-    return tuple(tuple(sorted(group)) for group in groups if len(group) > 1)
+    return tuple(group for group in merged(groups) if len(group) > 1)
 
 
-def merged(one: Groups, other: Groups) -> Groups:
+def merged(*groups: Sequence[Collection[str]]) -> Groups:
     """Return all groups, those that share an effect as one."""
     out: list[set[str]] = []
-    for group in (*one, *other):
+    for group in chain(*groups):
         whole = set(group)
         for known in [known for known in out if known & whole]:
             out.remove(known)

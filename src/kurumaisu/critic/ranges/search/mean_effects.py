@@ -7,21 +7,164 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, Families, SetWithBlock
-from kurumaisu.critic.ranges.search.dominant_effect import vanished_effects
-from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
-from kurumaisu.critic.ranges.search.effect_settings import settings_of
-from kurumaisu.critic.ranges.search.further_effects import FurtherEffects, further_effects
+from kurumaisu.critic.ranges.search.block_evidence import BEYOND, BlockComparison, Families, SetWithBlock, without_span
+from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
+from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, FormSearch
+from kurumaisu.critic.ranges.search.large_effect import vanished_effects
 from kurumaisu.critic.ranges.search.misfits import Part
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family
+from kurumaisu.critic.ranges.signals.coefficient_blocks import pose_curves
+from kurumaisu.critic.ranges.signals.effect_columns import Form
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
+from kurumaisu.critic.unknown.curves import curve_evidence
+from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.effects import Mechanism
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _SETS, _DOUBTED = 60, 8  # likeliest sets, and effects of theirs, whose equations are doubted
+
+
+def pose_curves_left(fit: ParameterFit, normal: NormalEquations) -> bool:
+    """Return whether a curve of the laser's pose explains what fitted effects leave, beside their parameters.
+
+    normal: with noise that was estimated whatever curves act.
+    """
+    there, beams = fit.assembly, fit.normal.beam_noise
+    noise = replace(normal, beam_noise=replace(beams, valid=beams.valid & normal.beam_noise.valid))
+    made = list(pose_curves(there.shots, there.marks, there.poses))
+    if not made:
+        return False
+    gram = there.products(noise, np.concatenate([fit.slopes, *(one for _, one in made)], axis=2), fit.left)
+    rest, start = np.arange(fit.slopes.shape[2]), fit.slopes.shape[2]
+    share = float(np.log(UNKNOWN_ODDS / len(made)))
+    for block, columns in made:
+        own = np.arange(start, start + columns.shape[2])
+        start = own[-1] + 1
+        if curve_evidence(*without_span(gram, own, rest), block.priors).nats + share > BEYOND:
+            return True
+    return False
+
+
+@dataclass(frozen=True)
+class FurtherEffects:
+    """What acts beside a fit: found among the rest, forms as in the whole matrix; groups: sets that look alike."""
+
+    found: FormPosterior
+    groups: Groups
+
+
+def further_effects(
+    assembly: Assembly,
+    normal: NormalEquations,
+    found: FormPosterior,
+    fit: FittedForms,
+    refitted: ParameterFit,
+    others: Mapping[str, FormFamily],
+) -> FurtherEffects | None:
+    """Return what acts beside a fit that was refitted; None where nothing does.
+
+    normal: with noise that was estimated whatever else acts; found: of the search that the fit is from; others: curves
+    that effects of the fit may follow instead.
+    """
+    known = {_key(form): form for form in assembly.forms if form.id not in fit.ids}
+    if not known or not _promising(found, fit):
+        return None
+    # Seen anew: how far a chair turns within a delay is told by a path that the loud effect had bent.
+    forms, columns = refitted.assembly.marks.forms(frozenset(form.id for form in known.values()))
+    rest = [form for form in forms if _key(form) in known]
+    # While a delay, say, is not in place, a path through the scans is too smooth beside jumps of the rates.
+    beams = refitted.normal.beam_noise
+    beams = replace(beams, valid=beams.valid & normal.beam_noise.valid)
+    refitted = replace(refitted, normal=replace(normal, beam_noise=beams))
+    # Curves that effects of the fit may follow instead, and what these effects do (k, b) [m].
+    parts = [(others[form.id], form, size) for form, size in fit.parts() if form.id in others]
+    curves = [(curve, assembly.columns[:, :, form.span] @ size) for curve, form, size in parts]
+    gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)
+    starts = np.cumsum([0, *(len(form.columns) for form in rest)])
+    moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
+    seen = FormSearch(moved, gram).run()
+    if not seen.named and not seen.confounded:
+        return None
+    names = [*seen.named, *(name for group in seen.confounded for name in group if name in seen.best.ids)]
+    groups = merged(seen.confounded, confounded(seen, None, (), gram, names))
+    back = {form.start: known[_key(form)] for form in moved}
+    fits = tuple(replace(one, forms=tuple(back[form.start] for form in one.forms)) for one in seen.fits)
+    return FurtherEffects(replace(seen, fits=fits), groups)
+
+
+def _key(form: Form) -> tuple[object, ...]:
+    return (form.id, *form.at.items(), *(column.parameter.name for column in form.columns))
+
+
+def _promising(found: FormPosterior, fit: FittedForms) -> bool:
+    """Return whether one more effect would be likelier if no share of what is there were asked of it."""
+
+    def unasked(one: FittedForms) -> float:
+        return one.score + LINE_ERROR * max(len(one.forms) - 1, 0) * one.log_likelihood
+
+    return any(unasked(one) > unasked(fit) for one in found.fits if one.ids > fit.ids)
+
+
+def _gram(
+    parts: Sequence[NDArray[np.float32]], refitted: ParameterFit, curves: Sequence[tuple[FormFamily, FloatArray]]
+) -> FloatArray:
+    """Return the normal equations of columns (k, b, m) and, last, of what the refitted leave, whatever their sizes."""
+    there = refitted.assembly
+    left = there.residual - there.marks.together([setting for setting, _ in refitted.settings])
+    count = sum(part.shape[2] for part in parts)
+    free = [curve.columns(there.shots, there.marks.seen) for curve, _ in curves]
+    signals = [change[:, :, np.newaxis] for _, change in curves]
+    every = np.concatenate([*parts, refitted.slopes, *free, *signals], axis=2)
+    gram = there.products(refitted.normal, every, left)
+    ends = np.cumsum([count, refitted.slopes.shape[2], *(part.shape[2] for part in free)])
+    powers = np.diag(gram)[ends[-1] : -1]
+    priors = [
+        curve.scaled(gram[low:high, low:high], power)
+        for (curve, _), low, high, power in zip(curves, ends[1:-1], ends[2:], powers.tolist(), strict=True)
+    ]
+    drawn = np.arange(count, ends[-1])
+    keep = np.r_[np.arange(count), len(gram) - 1]
+    prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors)
+    return integrated_out(gram, drawn, prior)[np.ix_(keep, keep)]
+
+
+def settings_of(assembly: Assembly, fit: FittedForms) -> list[EffectSetting]:
+    """Return the fitted effects as a model file has them."""
+    out = []
+    for form, at in fit.parts():
+        effect = effects.by_id(form.id)
+        if len(form.columns) > 1 and form.columns[0].beside:
+            out.append(EffectSetting(form.id, {**assembly.marks.null(effect), **assembly.marks.joined(form, at)}))
+            continue
+        values = assembly.marks.null(effect)
+        for column, coefficient in zip(form.columns, at.tolist(), strict=True):
+            if column.squared:
+                values |= _squared(effect, form.at, coefficient)
+            else:
+                values[column.parameter.name] += column.parameter.scale * coefficient
+        shape = {} if form.columns[0].squared else form.at
+        values |= shape
+        # Two effects that nearly cancel are fitted as sums, which no bound stops.
+        within = {p.name: float(np.clip(values[p.name], p.lower, p.upper)) for p in effect.parameters}
+        out.append(EffectSetting(form.id, within))
+    return out
+
+
+def _squared(effect: type[Mechanism], signs: Mapping[str, float], coefficient: float) -> dict[str, float]:
+    """Return the parameters that act by their squares together, for their common square in units of their scales."""
+    size = float(np.sqrt(max(coefficient, 0.0)))
+    return {
+        p.name: float(np.clip(p.null + signs[p.name] * size * p.scale, p.lower, p.upper))
+        for p in effect.parameters
+        if p.name in signs
+    }
 
 
 @dataclass(frozen=True)
@@ -56,7 +199,14 @@ class MeanEffects:
 
     def with_further(self, assembly: Assembly, normal: NormalEquations, more: FurtherEffects) -> MeanEffects:
         """Return the same with what acts beside it."""
-        fit = more.added_to(self.fit)
+        one, other = self.fit, more.found.best
+        fit = FittedForms(
+            (*one.forms, *other.forms),
+            np.concatenate([one.coefficients, other.coefficients]),
+            np.concatenate([one.sds, other.sds]),
+            one.log_likelihood + other.log_likelihood,
+            one.score + other.score,
+        )
         return replace(self, fit=fit, others=form_families(assembly, normal, [fit]), more=more)
 
     def parts(self) -> list[Part]:

@@ -50,11 +50,7 @@ def _moments(assembly: Assembly, rows: IntArray) -> Moments:
     """Return when and where readings were taken; rows: places of them in arrays (k, b) made flat."""
     shots, seen = assembly.shots, assembly.marks.seen
     scan, beam = np.divmod(rows, seen.ranges.shape[1])
-    origins, bearings = assembly.origins()
-    laser = origins[scan, beam]
-    along = laser[:, 2] + bearings[scan, beam]
-    reach = np.where(np.isfinite(seen.level), seen.level, np.nan)[scan, beam, np.newaxis]
-    places = laser[:, :2] + reach * np.column_stack([np.cos(along), np.sin(along)])
+    places = seen.ends(np.where(np.isfinite(seen.level), seen.level, np.nan))[scan, beam]
     return Moments(shots.runs, shots.run[scan], shots.stamps[scan] + shots.zero, places)
 
 
@@ -128,16 +124,14 @@ def _covariates(assembly: Assembly) -> dict[str, tuple[str, FloatArray]]:
     """Return what a misfit may be drawn over, with units and a value per reading, (k, b)."""
     seen, shots = assembly.marks.seen, assembly.shots
     shape = seen.ranges.shape
-    bearings = np.array([beams.bearings for beams in seen.beams])
-    poses, _ = assembly.origins()
     out: Sequence[tuple[str, str, FloatArray]] = (
         ("range", "m", seen.ranges),
         ("angle of incidence", "rad", seen.incidence),
-        ("bearing of the beam", "rad", np.broadcast_to(bearings, shape)),
+        ("bearing of the beam", "rad", seen.bearings),
         ("time", "s", np.broadcast_to(shots.stamps[:, np.newaxis], shape)),
         ("reflectance of the wall", "1", seen.returns),
         ("change of the range with the heading", "m/rad", assembly.poses[:, :, 2]),
-        ("x of the laser in the map", "m", poses[..., 0]),
-        ("y of the laser in the map", "m", poses[..., 1]),
+        ("x of the laser in the map", "m", seen.origins[..., 0]),
+        ("y of the laser in the map", "m", seen.origins[..., 1]),
     )
     return {name: (unit, values) for name, unit, values in out if np.isfinite(values).all() and np.ptp(values) > 0}

@@ -3,19 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.ranges.noise.beam_offsets import OffsetProducts, offset_products, without_beam_offsets
-from kurumaisu.critic.ranges.noise.reading_noise import (
-    OUTLIER,
-    BeamNoise,
-    estimate_reading_noise,
-    expected_readings,
-)
+from kurumaisu.critic.ranges.noise.reading_noise import OUTLIER, BeamNoise, estimate_reading_noise, expected_readings
 from kurumaisu.critic.ranges.noise.scan_noise import (
     CommonMode,
     beyond_stated,
@@ -26,24 +20,32 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
 from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
     Layout,
+    OffsetProducts,
     ScanNoise,
+    Stacked,
     lasting_sds,
-    marginal,
+    offset_products,
     own_pose_sds,
     pose_sds,
     whitened,
+    without_beam_offsets,
 )
-from kurumaisu.critic.ranges.poses.likeliest_path import MotionEvidence, PoseEvidence, motion_evidence, pose_evidence
-from kurumaisu.critic.ranges.poses.pose_corrections import pose_corrected, stands_of
+from kurumaisu.critic.ranges.poses.pose_corrections import (
+    MotionEvidence,
+    PoseEvidence,
+    motion_evidence,
+    pose_corrected,
+    pose_evidence,
+    stands_of,
+)
 from kurumaisu.critic.ranges.scans.beams import Shots, deviations, model_effects_with, moved_by_pose, some_scans
-from kurumaisu.critic.ranges.scans.blocked_beams import blocked_beams, described
-from kurumaisu.critic.ranges.scans.map_changes import map_change
-from kurumaisu.critic.ranges.scans.passing_objects import Sights, passing_objects
-from kurumaisu.critic.ranges.scans.range_step import grid_step, unrounded
+from kurumaisu.critic.ranges.scans.map_changes import Sights, blocked_beams, described, map_change, passing_objects
 from kurumaisu.critic.ranges.scans.valid_readings import (
     cut_off_ends,
+    grid_step,
     inside_ends,
     pose_weights,
+    unrounded,
     usable_beams,
     usable_readings,
     without_cut_off,
@@ -94,7 +96,7 @@ class Assembly:
         somewhere = without_cut_off(shots.measured, ends)
         # Where readings of the map's own walls are cut off, only what stands before them is left.
         kept = np.where(inside_ends(self.marks.base, ends), self.marks.base, np.nan)
-        self.map_change = map_change(somewhere, kept, self.hits(), self.marks.seen.incidence)
+        self.map_change = map_change(somewhere, kept, self.marks.seen.ends(self.marks.base), self.marks.seen.incidence)
         # Which readings (k, b) are of what the map has, as far as is known.
         self.mapped = ~self.blocked & ~self.map_change.readings
         others = np.where(self.mapped, somewhere, np.nan)
@@ -141,17 +143,10 @@ class Assembly:
         known = {each.covariate for each in staying}
         return [*riding, *staying, *(each for each in self.passing_objects.unknowns() if each.covariate not in known)]
 
-    def hits(self) -> FloatArray:
-        """Return where (k, b, 2) [m] the beams meet the map."""
-        poses, bearings = self.origins()
-        angles = poses[:, :, 2] + bearings
-        way = self.marks.base[:, :, np.newaxis] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        return np.asarray(poses[:, :, :2] + way)
-
     def _seen_by(self, readings: FloatArray) -> Sights:
         """Return what readings (k, b) [m] see, from where the scans are taken to be."""
         middle = readings.shape[1] // 2
-        return Sights(readings, self.marks.base, self.shots.laser.bearings, self.origins()[0][:, middle])
+        return Sights(readings, self.marks.base, self.shots.laser.bearings, self.marks.seen.origins[:, middle])
 
     def _on_smooth_path(self) -> BoolArray:
         """Return which scans (k,) lie where the chair's path is smooth; all where that is seldom."""
@@ -197,7 +192,7 @@ class Assembly:
                     continue  # with this shape some beams meet nothing
                 self.columns[:, :, form.span] = some
                 use = np.concatenate([np.arange(other.span.start, other.span.stop) for other in fitted])
-                gram = marginal(self.grams(beam, use, lasting=True), self.layout, scan)[0]
+                gram = Stacked(self.grams(beam, use, lasting=True), self.layout).marginal(scan)[0]
                 gain = float(gram[:-1, -1] @ _solve(gram[:-1, :-1], gram[:-1, -1]))
                 if gain > best:
                     best, at, columns = gain, shape, some
@@ -307,12 +302,10 @@ class Assembly:
         beams = self.residual.shape[1]
         inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
         grams, parts = [], []
-        for k in range(len(self.residual)):
-            own, shared, last = self._rows(k, np.arange(count), lasting=True)
-            rows = whitened(np.hstack([own, shared, last]), beam.valid[k], beam.sd[k], beam.rho)
-            grams.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
+        for k, (rows, gram) in enumerate(self._whitened(beam, np.arange(count), lasting=True)):
+            grams.append(gram)
             products = offset_products(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
-            lead = own.shape[1] + shared.shape[1]
+            lead = gram.own + gram.shared
             parts.append(products[:, :lead])
             common += products[:, lead:]
         return grams, OffsetProducts(tuple(parts), common, inner)
@@ -322,23 +315,23 @@ class Assembly:
 
         lasting: with what lasts of the errors of the poses.
         """
-        out = []
+        return [gram for _, gram in self._whitened(beam, columns, lasting=lasting)]
+
+    def _whitened(
+        self, beam: BeamNoise, columns: IntArray | None, *, lasting: bool
+    ) -> Iterator[tuple[FloatArray, Gram]]:
+        """Yield the whitened rows of each scan, and the normal equations of these and of how the chair moved."""
         for k in range(len(self.residual)):
             own, shared, common = self._rows(k, columns, lasting=lasting)
             rows = whitened(np.hstack([own, shared, common]), beam.valid[k], beam.sd[k], beam.rho)
-            out.append(self._gram(k, rows, own.shape[1], shared.shape[1]))
-        return out
-
-    def _gram(self, k: int, rows: FloatArray, own: int, shared: int) -> Gram:
-        """Return the normal equations of a scan, of its readings and of how the chair moved."""
-        matrix = rows.T @ rows
-        if own and self.motion is not None:
-            steady = self.motion[k]
-            matrix[:own, :own] += steady.rows.T @ steady.rows
-            matrix[:own, -1] += steady.rows.T @ steady.left
-            matrix[-1, :own] = matrix[:own, -1]
-            matrix[-1, -1] += steady.left @ steady.left
-        return Gram(matrix, own, shared)
+            matrix, size = rows.T @ rows, own.shape[1]
+            if size and self.motion is not None:
+                steady = self.motion[k]
+                matrix[:size, :size] += steady.rows.T @ steady.rows
+                matrix[:size, -1] += steady.rows.T @ steady.left
+                matrix[-1, :size] = matrix[:size, -1]
+                matrix[-1, -1] += steady.left @ steady.left
+            yield rows, Gram(matrix, size, shared.shape[1])
 
     def _motion(self) -> list[MotionEvidence]:
         """Return what the chair's motion says of the errors of the poses under each scan."""
@@ -357,7 +350,7 @@ class Assembly:
         readings leaves little of their noise. NaN where next to nothing is left.
         """
         grams = self.grams(beam, columns)
-        total = marginal(grams, self.layout, _BROAD)[0]
+        total = Stacked(grams, self.layout).marginal(_BROAD)[0]
         beta = _solve(total[:-1, :-1], total[:-1, -1])
         out: FloatArray = np.empty_like(self.residual)
         for k, gram in enumerate(grams):
@@ -405,11 +398,6 @@ class Assembly:
             return np.concatenate([[noise.common_sd], pose_sds(noise)])
         own = np.tile(own_pose_sds(noise), self.hats[k].weights.shape[1])
         return np.concatenate([[noise.common_sd], lasting_sds(noise), own])
-
-    def origins(self) -> tuple[FloatArray, FloatArray]:
-        """Return poses (k, b, 3) of the laser and bearings (k, b) [rad] at which beams leave it, by the model."""
-        seen = self.marks.seen
-        return seen.origins, np.array([each.bearings for each in seen.beams])
 
 
 def _solve(gram: FloatArray, target: FloatArray) -> FloatArray:

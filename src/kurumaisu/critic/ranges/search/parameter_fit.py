@@ -20,6 +20,7 @@ from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, beam_family
+from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
@@ -81,9 +82,11 @@ def fit_parameters(
         return ParameterFit((), assembly, normal, assembly.residual, none, none)
     at = [dict(setting.parameters) for setting in settings]
     curves = [others[form.id] for form in forms if form.id in others]
-    block = _block(assembly, winner)
+    block = np.empty((*assembly.residual.shape, 0))  # in units in which its coefficients have a prior sd of 1
+    if winner is not None:
+        block = np.asarray(assembly.columns[:, :, winner.free.span] @ root_of(winner.evidence.prior))
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
-    moving = _strong(assembly, normal, _settings(forms, at)) or any(
+    moving = strength(assembly, normal, assembly.marks.together(_settings(forms, at))) > STRONG or any(
         not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
     )
     free = [each for i, form in enumerate(forms) for each in _free(i, form, at[i])]
@@ -131,11 +134,6 @@ def _signals(
     whole = assembly.marks.together(every)
     others = ([without if j == i else one for j, one in enumerate(every)] for i, without in absent.items())
     return [whole - assembly.marks.together(other) for other in others]
-
-
-def _strong(assembly: Assembly, normal: NormalEquations, settings: Sequence[EffectSetting]) -> bool:
-    """Tell whether effects move readings by more than they scatter anyway."""
-    return strength(assembly, normal, assembly.marks.together(settings)) > STRONG
 
 
 def strength(assembly: Assembly, normal: NormalEquations, change: FloatArray) -> float:
@@ -251,12 +249,3 @@ def _slope(assembly: Assembly, forms: Sequence[Form], at: Sequence[dict[str, flo
     effect = effects.by_id(forms[free.index].id)
     low, high = (assembly.marks.change(effect, {**here, p.name: end}) for end in ends.tolist())
     return np.asarray((high - low) / (ends[1] - ends[0]))
-
-
-def _block(assembly: Assembly, winner: SetWithBlock | None) -> FloatArray:
-    """Return the columns (k, b, m) of a block, in units in which its coefficients have a prior sd of 1."""
-    if winner is None:
-        return np.empty((*assembly.residual.shape, 0))
-    values, vectors = np.linalg.eigh(winner.evidence.prior)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return np.asarray(assembly.columns[:, :, winner.free.span] @ root)

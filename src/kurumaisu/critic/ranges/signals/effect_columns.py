@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, acts_on_readings, hits_of, predict, thin
-from kurumaisu.critic.ranges.signals.shape_grids import directions, geometric, grid_of
 from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray, IntArray
@@ -29,6 +28,10 @@ _FINER = tuple(2.0 ** np.arange(-0.375, 0.4, 0.0625))  # about a value of the gr
 _BETWEEN = np.pi / 16 * np.linspace(-1, 1, 9)  # [rad] about such a direction
 _AROUND = 127  # shapes that are tried to say a sum of two as one
 _RANK = 1e-3  # singular values below this share of the largest do not count
+# Times the usual value, the longest time that is tried: longer ones have no source, and every offset would be a set
+# with one. The shortest that is tried, as a share of the usual value or of a short recording.
+_LONG, _SHORT = 2.0**1.5, 1 / 16
+_HALF_TURN = 8  # directions in half a turn of two parameters that act by their squares
 
 
 @dataclass(frozen=True)
@@ -65,28 +68,17 @@ class EffectColumns:
 
     def __init__(self, shots: Shots) -> None:
         self._shots = shots
-        self._seen = hits_of(shots, (), 0)
+        self.seen = hits_of(shots, (), 0)
         self._own = {setting.id: setting.parameters for setting in shots.own}
-        self.base = predict(shots, (), self._seen, 0)
+        self.base = predict(shots, (), self.seen, 0)
         self._halves: dict[tuple[str, str], bool] = {}
         self._probe = EffectColumns(thin(shots, _PROBE)) if len(shots.stamps) > _PROBE else self
 
-    @property
-    def seen(self) -> BeamHits:
-        """What the beams meet by the model."""
-        return self._seen
-
     def thinned(self, rows: IntArray) -> EffectColumns:
         """Return some of the scans alone."""
-        out, seen = copy(self), self._seen
-        out._seen = BeamHits(
-            seen.ranges[rows],
-            seen.level[rows],
-            seen.incidence[rows],
-            seen.returns[rows],
-            tuple(seen.beams[row] for row in rows.tolist()),
-            seen.origins[rows],
-        )
+        out, seen = copy(self), self.seen
+        parts = {name: getattr(seen, name)[rows] for name in ("ranges", "level", "incidence", "returns", "origins")}
+        out.seen = BeamHits(beams=tuple(seen.beams[row] for row in rows.tolist()), **parts)
         out.base = self.base[rows]
         return out
 
@@ -94,12 +86,12 @@ class EffectColumns:
         """Return the change (k, b) [m] of the mean by an effect with values in place of the model's."""
         setting = EffectSetting(effect.id, {**self.null(effect), **values})
         moved = effect.id not in self._own and issubclass(effect, effects.ReadingEffect)
-        seen = self._seen if moved else hits_of(self._shots, (setting,), seed, like=self._seen)
+        seen = self.seen if moved else hits_of(self._shots, (setting,), seed, like=self.seen)
         return np.asarray(predict(self._shots, (setting,), seen, seed) - self.base)
 
     def together(self, settings: Sequence[EffectSetting]) -> FloatArray:
         """Return the change (k, b) [m] of the mean by effects with these values in place of the model's."""
-        seen = hits_of(self._shots, settings, 0, like=self._seen)
+        seen = hits_of(self._shots, settings, 0, like=self.seen)
         return np.asarray(predict(self._shots, settings, seen, 0) - self.base)
 
     def null(self, effect: type[Mechanism]) -> dict[str, float]:
@@ -302,3 +294,38 @@ def _largest(values: FloatArray) -> float:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.nansum(values**2) / max(np.count_nonzero(~np.isnan(values)), 1)))
+
+
+def directions(count: int) -> list[tuple[float, ...]]:
+    """Return sizes of parameters that act by their squares; of two, directions over half a turn."""
+    if count == 2:
+        return [
+            (round(float(np.cos(a)), 12), round(float(np.sin(a)), 12))
+            for a in np.pi / _HALF_TURN * np.arange(_HALF_TURN)
+        ]
+    every = product((-1.0, 0.0, 1.0), repeat=count)
+    return [signs for signs in every if next((sign for sign in signs if sign), 0.0) > 0]
+
+
+def grid_of(parameter: Parameter, span: float) -> list[float]:
+    """Return values of a parameter that only shapes an effect; span [s]: of the scans, for a parameter in seconds.
+
+    The longest time comes first: of shapes that are alike the first is kept, and that one is most like a constant.
+    Where none is usual, none comes before it.
+    """
+    if parameter.unit == "s":
+        usual = parameter.null or parameter.scale
+        longest, shortest = _LONG * usual, _SHORT * min(span, usual)
+        values = longest * 2.0 ** -np.arange(0, np.log2(longest / shortest) + 0.1, 0.5)
+        if not parameter.null:
+            values = np.r_[0.0, values]
+    elif parameter.lower > 0:
+        values = parameter.null * 2.0 ** np.arange(-3, 1.6, 0.25)
+    else:
+        values = parameter.null + parameter.scale * np.arange(0, 3.1, 0.5)
+    return [float(value) for value in values if parameter.lower <= value <= parameter.upper] or [parameter.null]
+
+
+def geometric(parameter: Parameter) -> bool:
+    """Return whether a parameter's grid is of factors."""
+    return parameter.unit == "s" or parameter.lower > 0

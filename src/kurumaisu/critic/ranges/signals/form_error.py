@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.signals.coefficient_blocks import echoes_of
-from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
+from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of, root_of
 from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -123,8 +123,7 @@ def beam_family(shots: Shots) -> FormFamily:
 
 def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
     """Return normal equations with some columns' coefficients integrated out, which are normal with a covariance."""
-    values, vectors = np.linalg.eigh(prior)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    root = root_of(prior)
     cross = root.T @ gram[columns]
     inner = np.eye(len(prior)) + root.T @ gram[np.ix_(columns, columns)] @ root
     return np.asarray(gram - cross.T @ np.linalg.solve(inner, cross))
