@@ -13,7 +13,7 @@ from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.ranges.signals.form_error import DrawnCurve, FormFamily, form_family, integrated_out
-from kurumaisu.critic.values.policy import FORM_ERROR
+from kurumaisu.critic.values.prior import FORM_ERROR
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))

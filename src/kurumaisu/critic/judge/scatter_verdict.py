@@ -21,7 +21,7 @@ from kurumaisu.critic.scatter.scatter_fit import ScatterFit
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect, ScatterSearch
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.scatter.statistics import Statistics
-from kurumaisu.critic.values.policy import FORM_ERROR, NAMED, RIVAL
+from kurumaisu.critic.values.prior import FORM_ERROR, NAMED, RIVAL
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.params import EffectSetting

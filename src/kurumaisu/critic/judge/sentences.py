@@ -14,7 +14,7 @@ from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
 from kurumaisu.critic.imu.turning_only import EXPLAINED
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import quantities, with_interval
-from kurumaisu.critic.values.policy import NAMED, RIVAL
+from kurumaisu.critic.values.prior import NAMED, RIVAL
 from kurumaisu.critic.values.story import Alternative
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 

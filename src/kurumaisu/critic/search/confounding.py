@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from kurumaisu.critic.engine.evidence import Fit
-from kurumaisu.critic.values.policy import MEMBER, NAMED
+from kurumaisu.critic.values.prior import MEMBER, NAMED
 from kurumaisu.types import FloatArray
 
 _MOST = 7  # members of a set: more may be a chance leaving that everything explains a little

@@ -13,8 +13,7 @@ from kurumaisu.critic.engine.catalogue import Candidate
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.search.confounding import SetPosterior, confounded
 from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
-from kurumaisu.critic.values.policy import NAMED
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.prior import NAMED, UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
 _NEAR, _LIKELY = 8.0, 5  # [nat] behind the best set within which others may be the cause in another noise; how many

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What is believed before the data: how large an effect shows, and how many act at once."""
+"""What is believed before the data, and from which probability what is said: numbers that decide in several rooms."""
 
 from __future__ import annotations
 
@@ -19,6 +19,13 @@ _PROPORTION, _ANY = 2.0, 0.1
 _PLACES = np.linspace(-3.0, 3.0, 13)  # [sd] about a fit, at which proportions are weighed
 # Odds of one more effect at work, shared by all that the drives could show: half of all chairs have none.
 _MORE = 0.7
+NAMED = 0.9  # posterior from which a cause is named
+RIVAL = 0.05  # posterior from which an effect counts as a rival of another
+# The same from which it is a member of a set, which has to hold the truth in 95 cases of 100: of several that each may
+# be left out, one acts more often than one of them by itself.
+MEMBER = 0.02
+FORM_ERROR = 0.15  # share of its signal by which a chair's fault may differ from the catalogue's equation for it
+FORM_WAYS = 4  # in which a form may differ, of which one passes for another size, or another effect's
 
 
 def log_prior(size: int, of: int) -> float:

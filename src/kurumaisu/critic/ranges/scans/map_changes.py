@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
+from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 

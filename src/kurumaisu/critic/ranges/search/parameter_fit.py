@@ -20,7 +20,7 @@ from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, beam_family
-from kurumaisu.critic.values.policy import FORM_ERROR, FORM_WAYS
+from kurumaisu.critic.values.prior import FORM_ERROR, FORM_WAYS
 from kurumaisu.effects import Parameter
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray

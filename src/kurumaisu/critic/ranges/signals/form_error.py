@@ -17,7 +17,7 @@ from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.signals.coefficient_blocks import echoes_of
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
-from kurumaisu.critic.values.policy import FORM_ERROR
+from kurumaisu.critic.values.prior import FORM_ERROR
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _FOLLOWED = ("time", "range", "incidence", "bearing")
