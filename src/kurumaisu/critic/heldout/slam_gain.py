@@ -14,7 +14,7 @@ from kurumaisu import effects, geometry, slam_score
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import driven, prepare_all
-from kurumaisu.critic.heldout import scan_gain, slam_gain
+from kurumaisu.critic.heldout import scan_gain
 from kurumaisu.critic.heldout.drive_gain import BLOCK, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
@@ -291,7 +291,7 @@ def with_slam(criticism: Criticism, recording: Recording, extension: Extension) 
     verdict, story = criticism.verdict, criticism.story
     if extension.empty or verdict.gain is None:
         return criticism
-    seen = slam_gain.measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
+    seen = measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
     told = replace(story, details=(*story.details, seen.sentence))
     if seen.gain is None or seen.picture is None:
         return replace(criticism, story=told)
