@@ -165,7 +165,7 @@ def two_runs(tmp_path):
     """A recording of two drives in a room."""
     from view_rig import LASER, ROOM, drive, meta
 
-    from kurumaisu.critic.data.csv_writer import write_csv_run
+    from kurumaisu.critic.data.csv_reader import write_csv_run
 
     (tmp_path / "room.world").write_text(ROOM)
     meta(tmp_path, world="room.world", laser=LASER)

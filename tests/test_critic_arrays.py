@@ -8,10 +8,9 @@ import pytest
 from hidden_effect import recording
 
 from kurumaisu.critic.app.arrays import criticise_arrays, recording_of
-from kurumaisu.critic.app.watch import ContinuousCritic, WatchedCriticism
-from kurumaisu.critic.app.window import Heard, Window
+from kurumaisu.critic.app.watch import ContinuousCritic, Heard, WatchedCriticism, Window
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Fan

@@ -17,7 +17,7 @@ from kurumaisu.critic.app import batch
 from kurumaisu.critic.app.cli import main
 from kurumaisu.critic.app.display import Display, Plain, Terminal
 from kurumaisu.critic.app.job import Job, Outcome
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.errors import Error
 

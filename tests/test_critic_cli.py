@@ -9,10 +9,10 @@ import pytest
 from hidden_effect import recording
 
 from kurumaisu import effects
-from kurumaisu.critic.app import cli, inputs
+from kurumaisu.critic.app import cli
 from kurumaisu.critic.app.cli import main
 from kurumaisu.critic.app.job import Job, Outcome
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.critic.values.verdict import Verdict
@@ -131,19 +131,19 @@ def test_a_folder_of_recordings_is_told_from_a_recording(tmp_path):
     for name in ("a/meta.yaml", "b/run_1/pose.csv", "c.bag", "d/x.bag", ".hidden/meta.yaml", "out/notes", "notes.txt"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).touch()
-    found = inputs.recordings([tmp_path], tmp_path / "out")
+    found = cli.recordings([tmp_path], tmp_path / "out")
     assert [item.name for item in found] == ["a", "b", "c.bag", "d"]
-    assert inputs.names(found) == ["a", "b", "c", "d"]
-    assert inputs.recordings([tmp_path / "b"], tmp_path / "out") == [tmp_path / "b"]
+    assert cli.names(found) == ["a", "b", "c", "d"]
+    assert cli.recordings([tmp_path / "b"], tmp_path / "out") == [tmp_path / "b"]
     (tmp_path / "meta.yaml").touch()
-    assert inputs.recordings([tmp_path], tmp_path / "out") == [tmp_path]
+    assert cli.recordings([tmp_path], tmp_path / "out") == [tmp_path]
     with pytest.raises(Error, match="is given twice"):
-        inputs.recordings([tmp_path / "b", tmp_path / "a" / ".." / "b"], tmp_path / "out")
+        cli.recordings([tmp_path / "b", tmp_path / "a" / ".." / "b"], tmp_path / "out")
 
 
 def test_names_differ_where_recordings_do(tmp_path):
     given = [tmp_path / name for name in ("mon/x.bag", "tue/x.bag", "tue/x.rawlog.gz", "tue/y.bag")]
-    assert inputs.names(given) == ["mon/x", "tue/x.bag", "tue/x.rawlog.gz", "tue/y"]
+    assert cli.names(given) == ["mon/x", "tue/x.bag", "tue/x.rawlog.gz", "tue/y"]
 
 
 @pytest.mark.parametrize(

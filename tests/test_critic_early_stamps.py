@@ -37,7 +37,7 @@ def _verdict(made: Recording) -> Verdict:
 def test_a_stamp_at_the_other_end_of_a_period_is_noted() -> None:
     made = _made(6)
     assert _verdict(made).problems == ()
-    told = _verdict(_stamped(made, early_stamps.period(made.runs)))
+    told = _verdict(_stamped(made, early_stamps.tolerated_lead(made.runs) / 1.25))
     assert told.verdict == "none"
     assert any("before its command" in problem for problem in told.problems)
 
@@ -63,4 +63,4 @@ def test_an_input_of_one_row_has_no_period_of_its_own() -> None:
         assert run.command is not None
         one = replace(run.command, t=run.command.t[:1], values=run.command.values[:1])
         runs.append(replace(run, command=one, voltage=None))
-    assert early_stamps.period(runs) == 0.1
+    assert early_stamps.tolerated_lead(runs) == 0.125

@@ -11,7 +11,7 @@ from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.generator.motion import Fault, Form
 from kurumaisu.bench.hidden.generator.noise import USUAL
 from kurumaisu.critic import pipeline
-from kurumaisu.critic.data.elapsed import with_elapsed_time
+from kurumaisu.critic.data.excerpt import with_elapsed_time
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import shipped
 

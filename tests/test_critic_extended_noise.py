@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kurumaisu import effects
-from kurumaisu.critic.judge.extended_model import process_noise
+from kurumaisu.critic.judge.explain import process_noise
 from kurumaisu.critic.noise.base_noise import START
 from kurumaisu.params import load_model, shipped
 

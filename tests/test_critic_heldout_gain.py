@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What an extension is worth on data held out: by channel, on scans, and to SLAM; beside each gain its null."""
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -23,11 +22,9 @@ from kurumaisu.critic.app.results import summary
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
-from kurumaisu.critic.heldout.corrected_scans import corrected
-from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
+from kurumaisu.critic.heldout.slam_gain import Extension, corrected, with_scan_gain, with_slam
 from kurumaisu.critic.judge.merge import confirmed_scans, refuted, with_scans
-from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Pictures
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
@@ -35,15 +32,10 @@ from kurumaisu.critic.values.verdict import (
     ChannelGain,
     Gain,
     LogDensityGain,
-    RmseGain,
-    SlamGain,
     Unknown,
     Verdict,
-    read_verdict,
-    verdict_text,
 )
 from kurumaisu.params import EffectSetting, load_model, shipped
-from kurumaisu.whole_files import write_whole
 
 MODEL = load_model(shipped("launch/md100.yaml"))
 NOISE = noise_of(USUAL)
@@ -163,7 +155,7 @@ def test_a_fault_of_the_laser_gains_on_scans_held_out_and_a_wrong_one_loses(tmp_
 
 def test_a_fit_to_other_scans_finds_the_size(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 3, scans=40)
-    shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
+    shots = scan_gain.joined([some for _, some in scan_gain.ScanPoses(data, MODEL, None).trained_runs()])
     (again,) = scan_gain.refit(shots, (EffectSetting("laser.scale", {"scale": 0.02}),))
     assert again.parameters["scale"] == pytest.approx(0.01, abs=0.002)
 
@@ -174,7 +166,7 @@ def test_a_fit_to_few_other_scans_never_explains_them_worse(tmp_path):
     (run,) = data.runs
     warmth = Series(run.scan.t, 18 + 0.1 * run.scan.t[:, np.newaxis], ("temperature",))
     data = replace(data, runs=(replace(run, covariates={"temperature": warmth}),))
-    shots = scan_gain.joined(scan_gain.ScanPoses(data, MODEL, None).trained())
+    shots = scan_gain.joined([some for _, some in scan_gain.ScanPoses(data, MODEL, None).trained_runs()])
     values = {"coefficient": -5e-4, "swing": 5.0, "reference": 21.9, "period": 600.0, "lag": 41.0}
     before = EffectSetting("laser.temperature", values)
     (again,) = scan_gain.refit(shots, (before,))
@@ -324,16 +316,3 @@ def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):
     assert (left.causes, left.confounded, left.settings) == (causes[:1], (), (right,))
     assert gained.log_density_per_sample.lo90 > 0
     assert "laser.quadratic explain" in left.details[-1]
-
-
-def test_a_verdict_of_before_is_still_read(tmp_path):
-    path = tmp_path / "verdict.json"
-    error = RmseGain(2.0, 1.0, 1.0, 0.5, 1.5, "m", 0.9)
-    whole = Gain(NONE, {"position": error}, {"dx": drive_gain.ChannelGain(NONE, error)}, SlamGain("r", 9, error, error))
-    write_whole({path: verdict_text(Verdict("none", gain=whole))})
-    assert read_verdict(path).gain == whole
-    content = json.loads(path.read_text())
-    del content["gain"]["channels"], content["gain"]["slam"], content["gain"]["rmse"]["position"]["achievable"]
-    path.write_text(json.dumps(content))
-    old = read_verdict(path).gain
-    assert old == Gain(NONE, {"position": replace(error, achievable=None)})

@@ -12,7 +12,7 @@ from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.base.replay import extend
 from kurumaisu.critic.judge import scan_verdict
 from kurumaisu.critic.ranges.search import large_effect
-from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.criticism import LaserFinding, Pictures
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, load_model, shipped
 

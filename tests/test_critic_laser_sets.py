@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kurumaisu.critic.judge.clock_drift import without_double_delay
-from kurumaisu.critic.judge.reference_point import from_base_link, ruled_out
+from kurumaisu.critic.judge.reference_faults import from_base_link, ruled_out, without_double_delay
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search.confounding import confounded
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form, grid_of
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.criticism import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.effects import Parameter, by_id

@@ -22,8 +22,7 @@ from kurumaisu.critic.ranges.search.parameter_fit import fit_parameters
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.unknown.curves import CurveEvidence
-from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.criticism import Criticism, LaserFinding
 from kurumaisu.critic.values.policy import FORM_ERROR
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict

@@ -12,7 +12,7 @@ from kurumaisu.critic.app.look import look, main
 from kurumaisu.critic.bags.mcap_file import McapFile
 from kurumaisu.critic.bags.ros1 import Ros1Bag
 from kurumaisu.critic.bags.ros2 import Ros2Bag
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error

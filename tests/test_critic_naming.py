@@ -18,7 +18,7 @@ from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.held_out_pruning import confirmed_part, leave_one_out, untested
+from kurumaisu.critic.judge.drive_verdict import confirmed_part, leave_one_out, untested
 from kurumaisu.critic.noise.base_noise import Noise, NoiseGrowth, NoiseResiduals, whitener
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.search import search
@@ -213,7 +213,7 @@ def test_where_drives_held_out_decide_nothing_each_is_left_out_in_turn(held, nat
 )
 def test_drives_held_out_that_do_not_meet_what_is_certain_say_nothing(monkeypatch, held, nats, seen, silent):
     """Whatever they gain, if it is no loss beyond chance."""
-    monkeypatch.setattr("kurumaisu.critic.judge.held_out_pruning.expected_nats", lambda *_: seen)
+    monkeypatch.setattr("kurumaisu.critic.judge.drive_verdict.expected_nats", lambda *_: seen)
     made = decision({"a": 1.0}, fit_of("a", nats))
     assert untested(made, gain(held), ()) is silent
     assert not untested(made, None, ())

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from phased_drive import phased
 
-from kurumaisu.critic.sanity import pose_stamps
+from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series
 
 SEEDS = range(3)
@@ -15,7 +15,7 @@ def stamped(seed, rate, stamps):
     """Return what is said of a drive's reference whose stamps (n,) are made of the true ones, and a generator."""
     rng = np.random.default_rng(seed)
     pose = phased(rng, rate=rate).pose
-    return pose_stamps.problem(Series(stamps(pose.t, rng), pose.values, pose.columns))
+    return pose_jumps.problem(Series(stamps(pose.t, rng), pose.values, pose.columns))
 
 
 def queued(t, rng, share=0.7, longest=0.3):
@@ -54,7 +54,7 @@ def test_gaps_are_no_fault(rate, jitter):
         for begin in rng.uniform(5.0, 55.0, 4):
             kept &= (pose.t < begin) | (pose.t > begin + rng.uniform(0.3, 1.5))
         stamps = pose.t + rng.uniform(-jitter, jitter, len(pose.t))
-        assert pose_stamps.problem(Series(stamps[kept], pose.values[kept], pose.columns)) is None
+        assert pose_jumps.problem(Series(stamps[kept], pose.values[kept], pose.columns)) is None
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -84,4 +84,4 @@ def test_gaps_while_the_robot_changes_its_speed_are_no_fault(seed):
     for begin in rng.choice(changes, 5):
         kept &= (pose.t < begin - 0.5) | (pose.t > begin + 0.7)
     stamps = pose.t + rng.uniform(-0.004, 0.004, len(pose.t))
-    assert pose_stamps.problem(Series(stamps[kept], pose.values[kept], pose.columns)) is None
+    assert pose_jumps.problem(Series(stamps[kept], pose.values[kept], pose.columns)) is None

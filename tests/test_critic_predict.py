@@ -14,7 +14,7 @@ from kurumaisu.bench.hidden.generator.noise import REGIMES
 from kurumaisu.bench.hidden.oracle import noise_of
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.app.arrays import recording_of
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.data.reference import with_reference

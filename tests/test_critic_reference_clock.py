@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from laser_scene import recording, sparse
 
-from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
+from kurumaisu.critic.judge.reference_faults import by_commands, by_its_clock
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.values.verdict import Cause, Estimate
 from kurumaisu.params import EffectSetting, load_model, shipped

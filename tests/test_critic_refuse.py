@@ -133,7 +133,7 @@ def test_scans_alone_are_judged_for_how_they_repeat_themselves():
 HOURS = """
 import sys, numpy as np
 from pathlib import Path
-from kurumaisu.critic.data import long_runs
+from kurumaisu.critic.data import excerpt
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.sanity import examination
@@ -148,7 +148,7 @@ lines = [f"{a:.2f},{x:.4f},{y:.4f},{h:.4f}" for a, x, y, h in zip(t.tolist(), *(
 recording = read_recording(folder)
 assert len(recording.runs[0].pose.t) == len(t)
 assert not examination.examine(recording, load_model(shipped("launch/md100.yaml"))).invalid
-pieces = long_runs.bounded(recording)
+pieces = excerpt.bounded(recording)
 assert len(pieces.runs) == len(pieces.train) == 6, pieces.train
 assert pieces.runs[0].pose.t[0] == 0 and pieces.runs[-1].pose.t[-1] > t[-1] - 0.06
 assert all(len(run.pose.t) <= 12001 and len(run.command.t) <= 602 for run in pieces.runs)

@@ -18,11 +18,9 @@ from kurumaisu.critic.app.job import Job, Outcome
 from kurumaisu.critic.app.results import summary, table
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.report.figures import misfit_svg, shown_points
-from kurumaisu.critic.report.page import report_page
-from kurumaisu.critic.report.pictures import comparison_picture, misfit_picture, overlay_picture, thinned
-from kurumaisu.critic.values.binned_means import explained
+from kurumaisu.critic.report.page import comparison_picture, misfit_picture, overlay_picture, report_page, thinned
 from kurumaisu.critic.values.digits import odds, quantities, with_interval
-from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay
+from kurumaisu.critic.values.story import Bins, Comparison, Moments, Overlay, explained
 from kurumaisu.critic.values.verdict import Cause, Estimate, Verdict, grouped
 from kurumaisu.whole_files import write_whole
 

@@ -8,7 +8,7 @@ from laser_scene import recording
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.judge import misfit
-from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.judge.misfit import overlays
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.noise.base_noise import START
 from kurumaisu.critic.values.recording import Recording, Run, Series

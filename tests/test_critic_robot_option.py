@@ -9,7 +9,7 @@ from recordings import Bag, series
 
 from kurumaisu.critic.app import look
 from kurumaisu.critic.app.cli import main
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.params import robot_called

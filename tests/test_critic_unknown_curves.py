@@ -24,7 +24,7 @@ from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.unknown import curves, sentences, shapes
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
-from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
+from kurumaisu.critic.values.policy import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MD100 = shipped("launch/md100.yaml")

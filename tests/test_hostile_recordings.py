@@ -18,7 +18,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import CompressionMode
 
 from kurumaisu.critic.bags import limits
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error, told
 

@@ -13,7 +13,7 @@ from rosbags.rosbag1 import Writer
 from rosbags.rosbag2 import CompressionMode
 from rosbags.typesys import get_types_from_msg
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 

@@ -6,7 +6,7 @@ import pytest
 from recordings import series
 from scipy.spatial.transform import Rotation
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.rawlog_reader import to_run
+from kurumaisu.critic.data.log_reader import to_run
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from recordings import BEAMS, PACKAGE, assert_same, full_run, series
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.data.excerpt import Excerpt, gap, moment
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.critic.values.recording import Run

@@ -11,8 +11,7 @@ import pytest
 from stories import full_story, full_verdict
 
 from kurumaisu.critic.report.figures import MOST_POINTS, shown_points
-from kurumaisu.critic.report.page import quantities, report_page
-from kurumaisu.critic.report.pictures import LARGEST
+from kurumaisu.critic.report.page import LARGEST, quantities, report_page
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import Verdict
 

@@ -12,7 +12,7 @@ from kurumaisu.critic.data.meta import read_meta
 from kurumaisu.critic.engine.catalogue import catalogue
 from kurumaisu.critic.experiment.design import possible
 from kurumaisu.critic.experiment.rehearse import rehearse
-from kurumaisu.critic.values.verdict import read_verdict
+from kurumaisu.critic.values.verdict import verdict_text
 from kurumaisu.errors import Error
 from kurumaisu.experiments import shipped_script
 from kurumaisu.params import Robot, driven_as, load_model, robot_of, shipped, shipped_robot
@@ -275,7 +275,7 @@ def test_what_was_found_of_wheels_can_be_pasted_read_and_run(found, tmp_path):
     assert "wheel_separation_multiplier: 1.0" in page
     assert "left_wheel_radius_multiplier: 1.0" in page
     assert "chair" not in found.story.headline
-    assert read_verdict(tmp_path / "verdict.json") == found.verdict
+    assert (tmp_path / "verdict.json").read_text() == verdict_text(found.verdict)
     extended = load_model(tmp_path / "extended.yaml")
     assert extended.robot == robot(**WHEELS)
     assert extended.chassis.track == WHEELS["track"]

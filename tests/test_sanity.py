@@ -10,7 +10,7 @@ import pytest
 from kurumaisu.bench.critic import drives, sanity, wrong_data, wrong_scans
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.critic.sanity import input_match, map_placement, pose_stamps, rates
+from kurumaisu.critic.sanity import input_match, map_agreement, pose_jumps, rates
 from kurumaisu.critic.sanity import rows as sanity_rows
 from kurumaisu.critic.sanity.examination import examine
 from kurumaisu.critic.values.recording import Series
@@ -70,7 +70,7 @@ def test_the_warthogs_poses_wait_and_the_rest_of_them_do_not():
     told = {}
     for name, poses in (("all", log.all_poses), ("kept", log.pose)):
         rows = warthog.between(poses, 134.0, 218.0)
-        told[name] = pose_stamps.problem(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
+        told[name] = pose_jumps.problem(Series(rows[:, 0], rows[:, 1:], ("x", "y", "theta")))
     assert told["kept"] is None
     assert "times of arrival" in told["all"]
 
@@ -159,7 +159,7 @@ def test_a_map_is_moved_back_to_where_the_points_are():
     points = np.concatenate([a + rng.random((20, 1)) * (b - a) for a, b in ends.reshape(-1, 2, 2)])
     c, s = np.cos(0.7), np.sin(0.7)
     moved = (ends @ np.array([[c, s], [-s, c]]) + [3.0, -1.0]).reshape(-1, 4)
-    fitted = next(map_placement.nearest_maps(points, moved))
+    fitted = next(map_agreement.nearest_maps(points, moved))
     assert np.abs(fitted.segments - walls).max() < 0.05
 
 

@@ -13,7 +13,7 @@ import yaml
 from recordings import full_run, write_bag
 
 from kurumaisu import _slam, maps, slam
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.errors import Error
 from kurumaisu.geometry import compose
 from kurumaisu.params import shipped

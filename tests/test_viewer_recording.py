@@ -12,8 +12,8 @@ from rosbags.typesys import Stores, get_typestore
 from stories import full_story, full_verdict
 from view_rig import Look, drive, meta, on_circle, room_ranges, stamp_of
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
-from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.data.csv_reader import write_csv_run
+from kurumaisu.critic.judge.misfit import overlays
 from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.view.tape import laid

@@ -13,7 +13,7 @@ import pytest
 from recordings import Bag, full_run, write_bag
 from view_rig import LASER, Look, drive, meta
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.critic.view.command import main
 from kurumaisu.viewer.playback import CHAIR

@@ -9,8 +9,7 @@ import pytest
 from recordings import Bag
 from view_rig import Look
 
-from kurumaisu.critic.view.album import read_album
-from kurumaisu.critic.view.spool import Spool
+from kurumaisu.critic.view.tape import Spool, read_album
 
 
 def bag_of_scans(path, scans=1200, beams=682, intensities=lambda i: ()):

@@ -14,7 +14,7 @@ from view_rig import LASER, ROOM, drive, meta
 from viewer_page_rig import Visit, until
 from viewer_rig import viewer_settings
 
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.values.story import Moments, Overlay
 from kurumaisu.critic.view.command import opened

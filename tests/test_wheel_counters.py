@@ -10,7 +10,7 @@ from recordings import Bag
 from kurumaisu.critic import Meta, criticise_arrays
 from kurumaisu.critic.app.arrays import recording_of
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.counters import Counter, counted
+from kurumaisu.critic.data.odometry import Counter, counted
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.params import robot_of
 from kurumaisu.settings import Section

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from kurumaisu.critic.app.arrays import criticise_arrays
-    from kurumaisu.critic.data.csv_writer import write_csv_run
+    from kurumaisu.critic.data.csv_reader import write_csv_run
     from kurumaisu.critic.data.meta import Meta
     from kurumaisu.critic.data.reading import read_recording
     from kurumaisu.critic.pipeline import criticise, write
@@ -28,7 +28,7 @@ _ROOMS = {
     "criticise_arrays": "app.arrays",
     "read_recording": "data.reading",
     "write": "pipeline",
-    "write_csv_run": "data.csv_writer",
+    "write_csv_run": "data.csv_reader",
 }
 
 

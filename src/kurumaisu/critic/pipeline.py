@@ -8,26 +8,22 @@ from pathlib import Path
 
 from kurumaisu.critic.base.drive import driven
 from kurumaisu.critic.base.replay import model_of
-from kurumaisu.critic.data.elapsed import with_elapsed_time
-from kurumaisu.critic.data.long_runs import bounded
+from kurumaisu.critic.data.excerpt import bounded, with_elapsed_time
 from kurumaisu.critic.heldout import scan_gain
-from kurumaisu.critic.heldout.extension_gain import Extension, with_scan_gain, with_slam
+from kurumaisu.critic.heldout.slam_gain import Extension, with_scan_gain, with_slam
 from kurumaisu.critic.judge import explain
-from kurumaisu.critic.judge.clock_drift import by_commands, by_its_clock
 from kurumaisu.critic.judge.drive_verdict import NOTHING, criticise_drives, withheld
-from kurumaisu.critic.judge.extended_model import extended_text
+from kurumaisu.critic.judge.explain import extended_text
 from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
-from kurumaisu.critic.judge.reference_point import from_base_link, mountings, ruled_out
-from kurumaisu.critic.judge.robots import with_robot
+from kurumaisu.critic.judge.multipliers import with_robot
+from kurumaisu.critic.judge.reference_faults import by_commands, by_its_clock, from_base_link, mountings, ruled_out
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
 from kurumaisu.critic.ranges.scans.gathering import with_sweep_time
 from kurumaisu.critic.report.page import report_page
 from kurumaisu.critic.sanity import examination, masks
-from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding
-from kurumaisu.critic.values.progress import Progress
+from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.selection import those
 from kurumaisu.critic.values.verdict import verdict_text

@@ -12,7 +12,7 @@ import yaml
 from kurumaisu import effects
 from kurumaisu.critic.app import cli
 from kurumaisu.critic.app.job import Job
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.params import EffectSetting, Model, load_model, shipped
 from kurumaisu.sim.chair.joystick import joystick

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from kurumaisu.critic.experiment import simulated
+from kurumaisu.critic.experiment import rehearse
 from kurumaisu.errors import Error
 from kurumaisu.experiments import Limits
 from kurumaisu.geometry import PLANAR, compose
@@ -170,7 +170,7 @@ class LiveChair:
     def _advance(self) -> None:
         held = time.monotonic() - self._heard <= self._stick.dead_man
         self._commanded = self._asked if held else np.zeros(2)
-        volts = simulated.voltages(self._model, self._base, np.array([[0.0, *self._commanded]]))[0]
+        volts = rehearse.voltages(self._model, self._base, np.array([[0.0, *self._commanded]]))[0]
         self._volts = (float(volts[1]), float(volts[2]))
         self._seen = self._simulator.step(Command(*self._volts, *np.sign(volts[3:])))
         if self._seen.scan is not None:

@@ -10,9 +10,8 @@ import numpy as np
 
 from kurumaisu import program, settings
 from kurumaisu.critic.data.csv_reader import read_table
-from kurumaisu.critic.experiment import simulated
-from kurumaisu.critic.experiment.rehearse import manner, write
-from kurumaisu.critic.experiment.simulated import Notes
+from kurumaisu.critic.experiment import rehearse
+from kurumaisu.critic.experiment.rehearse import Notes, manner, write
 from kurumaisu.critic.view.command import Opened, port_number, stay, viewer_settings
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model, shipped
@@ -77,14 +76,14 @@ def _drive(options: argparse.Namespace) -> None:
     rng = np.random.default_rng(options.seed)
     seen = simulator.reset(int(rng.integers(2**31)))
     notes, touches, touched = Notes(model, how, seen), 0, False
-    volts = simulated.voltages(model, how.limits, rows)
-    for command in simulated.held(volts, simulator.step_time):
+    volts = rehearse.voltages(model, how.limits, rows)
+    for command in rehearse.held(volts, simulator.step_time):
         seen = simulator.step(command)
         notes.add(seen)
         touches += seen.contact and not touched
         touched = seen.contact
     run = notes.run("drive", rng, {"command": rows, "voltage": volts})
-    write(options.output, simulated.recording("drive", [run], model, how))
+    write(options.output, rehearse.recording("drive", [run], model, how))
     x, y, heading = seen.pose
     print(
         f"{seen.time:.2f} s driven, now at x {x:.3f}, y {y:.3f} m, {np.degrees(heading):.1f} deg; "

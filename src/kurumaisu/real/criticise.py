@@ -12,7 +12,7 @@ from kurumaisu.critic.app import cli
 from kurumaisu.critic.app.arrays import run_of
 from kurumaisu.critic.app.job import Job
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.types import FloatArray

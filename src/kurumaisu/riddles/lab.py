@@ -8,11 +8,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.experiment.rehearsal import Rehearsal
-from kurumaisu.critic.experiment.rehearse import manner
-from kurumaisu.critic.experiment.simulated import Manner
+from kurumaisu.critic.experiment.rehearse import Manner, Rehearsal, manner
 from kurumaisu.critic.judge.scan_verdict import criticise_scans as criticise_laser
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.criticism import LaserFinding
 from kurumaisu.critic.values.recording import LaserMount, Recording, Series
 from kurumaisu.experiments import Place, Script, shipped_script
 from kurumaisu.experiments.script import Box

@@ -15,8 +15,8 @@ from kurumaisu.bench.critic import drives, wrong_data, wrong_scans
 from kurumaisu.bench.table import Table, share
 from kurumaisu.critic.data.clean import Faults, clean
 from kurumaisu.critic.data.clean import Table as Rows
-from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.csv_reader import REQUIRED
+from kurumaisu.critic.data.reading import check_run
 from kurumaisu.critic.sanity import examination
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.params import load_model, shipped

@@ -23,8 +23,7 @@ from kurumaisu.bench.processes import cpu_time
 from kurumaisu.bench.table import Table
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.prediction import Prediction
+from kurumaisu.critic.values.criticism import Criticism, Prediction
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped

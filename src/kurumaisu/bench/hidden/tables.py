@@ -12,7 +12,7 @@ import numpy as np
 import yaml
 
 from kurumaisu.bench.hidden.generator.case import Truth
-from kurumaisu.critic.data.csv_writer import write_csv_run
+from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.errors import Error
 from kurumaisu.whole_files import write_whole

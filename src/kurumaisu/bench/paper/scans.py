@@ -15,8 +15,7 @@ import numpy as np
 
 from kurumaisu._core import integrate
 from kurumaisu.bench.table import Table, share
-from kurumaisu.critic.experiment.rehearsal import Rehearsal
-from kurumaisu.critic.experiment.rehearse import manner
+from kurumaisu.critic.experiment.rehearse import Rehearsal, manner
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.paper.chair import drive, identify
 from kurumaisu.paper.chair.law import BranchFit

@@ -12,11 +12,10 @@ from numpy.typing import ArrayLike
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.data.clean import Faults, Table, clean_part
 from kurumaisu.critic.data.completion import completed
-from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.csv_reader import IMU, OPTIONAL, QUERY, REQUIRED, check_queries
 from kurumaisu.critic.data.meta import Meta, recording_of_meta
 from kurumaisu.critic.data.odometry import with_wheels
-from kurumaisu.critic.data.reading import require_use, split
+from kurumaisu.critic.data.reading import check_run, require_use, split
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording, Run, Series, run_of_parts

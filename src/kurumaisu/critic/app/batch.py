@@ -34,31 +34,23 @@ def on_processes(jobs: Sequence[Job], count: int, display: Display) -> Iterator[
             for ready in wait(list(busy), _TICK):
                 assert isinstance(ready, Connection)
                 worker, job = busy[ready]
-                message = _received(worker, job)
+                try:
+                    message = worker.receive()
+                except EOFError:
+                    message = Outcome(job, 0.0, error=worker.died_of())
                 if isinstance(message, ProgressMessage):
                     display.tell(job.name, message.message)
                     continue
                 del busy[ready]
-                worker = _renewed(worker) if message.verdict is None else worker
+                if message.verdict is None:  # it may be dead, or out of memory
+                    worker.close()
+                    worker = Worker()
                 idle.append(worker)
                 display.end(message)
                 yield message
     finally:
         for worker in [*idle, *(worker for worker, _ in busy.values())]:
             worker.close()
-
-
-def _received(worker: Worker, job: Job) -> Any:
-    try:
-        return worker.receive()
-    except EOFError:
-        return Outcome(job, 0.0, error=worker.died_of())
-
-
-def _renewed(worker: Worker) -> Worker:
-    """Return a new worker in place of one that failed, which may be dead, or out of memory."""
-    worker.close()
-    return Worker()
 
 
 def on_dask(jobs: Sequence[Job], address: str, display: Display) -> Iterator[Outcome]:

@@ -8,15 +8,19 @@ import io
 import os
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from kurumaisu.critic.app import batch, inputs, results
+from kurumaisu.critic.app import batch, cli, results
 from kurumaisu.critic.app.display import Display, display
 from kurumaisu.critic.app.job import ERROR, Job, Outcome, run
 from kurumaisu.critic.app.options import parse
+from kurumaisu.critic.bags.containers import SUFFIXES, is_bag
+from kurumaisu.critic.data.csv_reader import is_csv_run
 from kurumaisu.critic.data.excerpt import Excerpt
+from kurumaisu.critic.data.reading import META, is_log
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error, one_line
@@ -90,7 +94,7 @@ def _run(jobs: list[Job], options: argparse.Namespace, shown: Display, done: dic
 
 
 def _jobs(options: argparse.Namespace) -> list[Job]:
-    found = inputs.recordings(options.recordings, options.output)
+    found = cli.recordings(options.recordings, options.output)
     if not found:
         raise Error(f"{options.recordings[0]}: contains no recording")
     ids = effect_ids(options.only, options.without)
@@ -102,7 +106,7 @@ def _jobs(options: argparse.Namespace) -> list[Job]:
         return [replace(asked, recording=found[0], output=options.output, name=found[0].name)]
     return [
         replace(asked, recording=path, output=options.output / name, name=name)
-        for path, name in zip(found, inputs.names(found), strict=True)
+        for path, name in zip(found, cli.names(found), strict=True)
     ]
 
 
@@ -151,3 +155,53 @@ def exit_code(outcomes: Sequence[Outcome]) -> int:
     """Return 1 when any failed, else the largest."""
     codes = [outcome.code for outcome in outcomes]
     return ERROR if ERROR in codes else max(codes)
+
+
+def recordings(paths: Sequence[Path], output: Path) -> list[Path]:
+    """Return the recordings among paths; a folder of recordings stands for all in it, without the output folder.
+
+    Raise Error for one that is meant twice. What cannot be read is found out later, when it is read.
+    """
+    found = [item for path in paths for item in _inside(path, output)]
+    twice = [item for item, count in Counter(item.resolve() for item in found).items() if count > 1]
+    if twice:
+        raise Error(f"{twice[0]}: is given twice")
+    return found
+
+
+def names(found: Sequence[Path]) -> list[str]:
+    """Return a name for each of several recordings, all different: its path below the folder that all share."""
+    whole = [item.resolve() for item in found]
+    shared = Path(os.path.commonpath([item.parent for item in whole]))
+    below = [item.relative_to(shared) for item in whole]
+    short = [str(item if full.is_dir() else _bare(item)) for item, full in zip(below, whole, strict=True)]
+    count = Counter(short)
+    return [name if count[name] == 1 else str(item) for name, item in zip(short, below, strict=True)]
+
+
+def _bare(path: Path) -> Path:
+    while path.suffix in (*SUFFIXES, ".rawlog", ".gz", ".clf", ".log"):
+        path = path.with_suffix("")
+    return path
+
+
+def _inside(path: Path, output: Path) -> list[Path]:
+    """Return the recordings of a folder that is no recording itself, else the path."""
+    if not path.is_dir() or is_bag(path) or (path / META).is_file():
+        return [path]
+    items = [item for item in sorted(path.iterdir()) if not item.name.startswith(".")]
+    folders = [item for item in items if item.is_dir() and item.resolve() != output.resolve()]
+    if not any(_is_recording(folder) for folder in folders):
+        return [path]
+    return sorted([*folders, *(item for item in items if item.is_file() and (is_bag(item) or is_log(item)))])
+
+
+def _is_recording(folder: Path) -> bool:
+    """Tell whether a folder is a recording of its own, rather than a run of the recording above it."""
+    if (folder / META).is_file():
+        return True
+    if is_bag(folder):
+        return False
+    inside = sorted(folder.iterdir())
+    runs = any(is_bag(item) or is_log(item) or (item.is_dir() and is_csv_run(item)) for item in inside)
+    return runs and not is_csv_run(folder)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,18 +13,16 @@ from kurumaisu import program
 from kurumaisu.critic.app.display import cells, printable
 from kurumaisu.critic.app.options import add_robot, add_span, name_list
 from kurumaisu.critic.bags.containers import is_bag
-from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
-from kurumaisu.critic.bags.topics import Topic
+from kurumaisu.critic.bags.topics import Topic, shown
 from kurumaisu.critic.data.bag_reader import TOPICS, mappings, read_bag_topics, wanted_of
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.consistency import check_run
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
 from kurumaisu.critic.data.meta import Meta
-from kurumaisu.critic.data.reading import chosen, meta_of, read_run, sources
-from kurumaisu.critic.data.wheel_reader import JOINTS
-from kurumaisu.critic.values.recording import PARTS, Run, Series
+from kurumaisu.critic.data.odometry import JOINTS
+from kurumaisu.critic.data.reading import check_run, chosen, meta_of, read_run, sources
+from kurumaisu.critic.values.recording import Run
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
@@ -36,28 +33,6 @@ rates, gaps, clocks; what meta.yaml could map; and what is missing for which
 verdict. Nothing is fitted, and nothing written."""
 _FASTER = 5.0  # times the usual interval is a gap
 _ENOUGH = 60.0  # [s] of motion, below which small effects stay hidden
-
-
-@dataclass(frozen=True)
-class Times:
-    """Times of rows (n,) [s], in the order they came, and how much later they were received [s], None: not known."""
-
-    t: FloatArray
-    late: float | None = None
-
-    @property
-    def told(self) -> tuple[str, str, str]:
-        """Rate, gaps and clock, in words."""
-        steps = np.diff(np.unique(self.t))
-        if not len(steps):
-            return "", "", self._clock()
-        usual = float(np.median(steps))
-        gaps = steps[steps > _FASTER * usual]
-        told = f"{len(gaps)}, up to {gaps.max():.3g} s" if len(gaps) else "none"
-        return f"{1 / usual:.3g} Hz", told, self._clock()
-
-    def _clock(self) -> str:
-        return "receipt" if self.late is None else f"stamp, {1e3 * self.late:+.3g} ms"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -160,27 +135,33 @@ def _topics(source: Path, meta: Meta) -> Generator[str, None, dict[str, Topic]]:
         rows = [("topic", "type", "messages", "rate", "gaps", "clock", "serves as")]
         for topic in found:
             read = topics.get(topic.name)
-            told = Times(read.times(), read.lateness()).told if read else (f"{topic.rate:.3g} Hz", "", "")
+            told = _timing(read.times(), read.lateness()) if read else (f"{topic.rate:.3g} Hz", "", "")
             could = [f"could be {TOPICS[part]}" for part in topic.serves]
-            role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could) or _note(topic.type)
+            could = could or ["could be wheels"] * (topic.type == shown(JOINTS))
+            role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could)
             rows.append((topic.name, topic.type, str(topic.count), *told, role))
         yield from _table(rows)
         yield from (f"  meta.yaml could say  {words}" for words in mappings(found, meta))
     return topics
 
 
-def _note(kind: str) -> str:
-    return "could be wheels" if kind == shown(JOINTS) else ""
+def _timing(t: FloatArray, late: float | None = None) -> tuple[str, str, str]:
+    """Return rate, gaps and clock of rows at times (n,) [s], in words; late [s]: when received, None: not known."""
+    steps = np.diff(np.unique(t))
+    clock = "receipt" if late is None else f"stamp, {1e3 * late:+.3g} ms"
+    if not len(steps):
+        return "", "", clock
+    usual = float(np.median(steps))
+    gaps = steps[steps > _FASTER * usual]
+    return f"{1 / usual:.3g} Hz", f"{len(gaps)}, up to {gaps.max():.3g} s" if len(gaps) else "none", clock
 
 
 def _parts(run: Run) -> Iterator[str]:
     """Yield the table of what a run is made of."""
     rows = [("part", "rows", "from", "to", "rate", "gaps")]
-    for name in (*PARTS, *run.covariates):
-        series: Series | None = run.covariates.get(name) or getattr(run, name, None)
-        if series is not None:
-            rate, gaps, _ = Times(series.t).told
-            rows.append((name, str(len(series.t)), f"{series.t[0]:.3f} s", f"{series.t[-1]:.3f} s", rate, gaps))
+    for name, series in {**run.parts(), **run.covariates}.items():
+        rate, gaps, _ = _timing(series.t)
+        rows.append((name, str(len(series.t)), f"{series.t[0]:.3f} s", f"{series.t[-1]:.3f} s", rate, gaps))
     yield from _table(rows)
 
 

@@ -96,7 +96,10 @@ def as_json(outcome: Outcome, *, alone: bool) -> str:
 def table(outcomes: Sequence[Outcome], width: int) -> str:
     """Return a table of outcomes for people, each line at most so wide, and a line that counts the verdicts."""
     rows = [("recording", "verdict", "gain", "what")]
-    rows += [(outcome.job.name, outcome.word, _gain_cell(outcome.verdict), _what(outcome)) for outcome in outcomes]
+    for outcome in outcomes:
+        gain = None if outcome.verdict is None else outcome.verdict.gain
+        told = "" if gain is None else f"{gain.log_density_per_sample.gain:+.3f}"
+        rows.append((outcome.job.name, outcome.word, told, _what(outcome)))
     longest = max(width // 3, _NARROWEST)
     rows = [(cut(printable(a), longest), printable(b), printable(c), printable(d)) for a, b, c, d in rows]
     widths = [max(cells(row[i]) for row in rows) for i in range(3)]
@@ -154,10 +157,6 @@ def causes(verdict: Verdict) -> list[str]:
         for cause in verdict.causes
         for values in [cause.parameters.items()]
     ]
-
-
-def _gain_cell(verdict: Verdict | None) -> str:
-    return "" if verdict is None or verdict.gain is None else f"{verdict.gain.log_density_per_sample.gain:+.3f}"
 
 
 def _what(outcome: Outcome) -> str:

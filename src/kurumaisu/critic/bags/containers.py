@@ -4,17 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
 from typing import Protocol
 
 from rosbags.interfaces import Connection
 
 from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.bags.mcap_file import McapFile
-from kurumaisu.critic.bags.ros1 import Ros1Bag
-from kurumaisu.critic.bags.ros1_old import MAGIC, OldRos1Bag
+from kurumaisu.critic.bags.ros1 import MAGIC, OldRos1Bag, Ros1Bag
 from kurumaisu.critic.bags.ros2 import METADATA, Database, Ros2Bag
+from kurumaisu.errors import Error
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 _MENDING = {
@@ -25,7 +25,7 @@ _MENDING = {
 
 
 class Bag(Protocol):
-    """An open bag, a context that closes it; times of receipt [ns], the end just after the last message."""
+    """A bag; times of receipt [ns], the end just after the last message."""
 
     @property
     def connections(self) -> list[Connection]:
@@ -44,13 +44,11 @@ class Bag(Protocol):
     ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, time of receipt and data."""
 
-    def __enter__(self) -> Bag:
-        """Open."""
+    def open(self) -> None:
+        """Find out what there is."""
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> object:
-        """Close."""
+    def close(self) -> None:
+        """Forget it."""
 
 
 def is_bag(path: Path) -> bool:
@@ -63,13 +61,25 @@ def bag_name(path: Path) -> str:
     return path.resolve().name if path.is_dir() else path.stem
 
 
-def opened(path: Path) -> Bag:
-    """Return a bag to be opened as a context. Raise Error for what is no regular file, or too large."""
-    if path.is_dir():
-        return Ros2Bag(path)
-    check_file(path, MOST_RECORDING)
-    readers: dict[str, Callable[[Path], Bag]] = {".bag": _ros1, ".mcap": McapFile, ".db3": Database}
-    return readers[path.suffix](path)
+@contextmanager
+def opened(path: Path) -> Iterator[Bag]:
+    """Open a bag, and close it. Raise Error for what is no regular file, too large, or damaged."""
+    try:
+        if not path.is_dir():
+            check_file(path, MOST_RECORDING)
+        readers: dict[str, Callable[[Path], Bag]] = {".bag": _ros1, ".mcap": McapFile, ".db3": Database}
+        bag = Ros2Bag(path) if path.is_dir() else readers[path.suffix](path)
+        bag.open()
+        try:
+            yield bag
+        finally:
+            bag.close()
+    except Error:
+        raise
+    except OSError as error:
+        raise Error(f"{path}: {error.strerror or error}") from error
+    except Exception as error:
+        raise Error(f"{broken(path)}: {str(error) or type(error).__name__}") from error
 
 
 def _ros1(path: Path) -> Bag:

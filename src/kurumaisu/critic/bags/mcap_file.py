@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
+import io
 import zlib
 from collections.abc import Collection, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, BinaryIO
 
-from mcap.records import Channel, Chunk, DataEnd, McapRecord, Message, Schema
+from mcap.exceptions import McapError
+from mcap.records import Channel, Chunk, DataEnd, Footer, McapRecord, Message, Schema, Statistics
 from mcap.stream_reader import StreamReader, breakup_chunk
 from rosbags.interfaces import (
     Connection,
@@ -23,7 +24,6 @@ from rosbags.rosbag2.metadata import ReaderMetadata, parse_qos
 from rosbags.typesys.msg import normalize_msgtype
 
 from kurumaisu.critic.bags.limits import LATEST, MOST_UNPACKED, UNPACKERS, Unpacker
-from kurumaisu.critic.bags.mcap_summary import Contents, stated_contents
 from kurumaisu.errors import Error, told
 
 _FORMATS = {
@@ -33,6 +33,10 @@ _FORMATS = {
     "omgidl": MessageDefinitionFormat.IDL,
 }
 _ROS1, _ROS2 = "ros1", "cdr"
+_MAGIC = b"\x89MCAP0\r\n"
+_FOOTER = 29  # bytes of its record, with opcode and length
+_CRC = 4  # bytes of the sum that ends it
+_MOST = 2**28  # bytes of a summary that is read
 
 
 class McapFile:
@@ -65,17 +69,6 @@ class McapFile:
     def close(self) -> None:
         """Forget the channels."""
         self.connections = []
-
-    def __enter__(self) -> McapFile:
-        """Open."""
-        self.open()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Close."""
-        self.close()
 
     def messages(
         self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
@@ -156,3 +149,64 @@ class _Whole:
         if count > min(self._size - self._file.tell(), MOST_UNPACKED * 4):
             raise EOFError("it ends within a record")
         return self._file.read(count)
+
+
+@dataclass
+class Contents:
+    """Channels, their schemas, and for each how many messages there are; times [ns] of the first and the last."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    counts: dict[int, int] = field(default_factory=dict)
+    first: int = 0
+    last: int = 0
+
+
+def stated_contents(path: Path) -> Contents | None:
+    """Return what a file states at its end; None where it states nothing, or what cannot be right."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        file.seek(max(size - _FOOTER - len(_MAGIC), 0))
+        end = file.read()
+        if len(end) < _FOOTER + len(_MAGIC) or not end.endswith(_MAGIC):
+            return None
+        try:
+            (footer,) = _records(end)
+            if (
+                not isinstance(footer, Footer)
+                or not 0 < footer.summary_start < size
+                or size - footer.summary_start > _MOST
+            ):
+                return None
+            file.seek(footer.summary_start)
+            summary = file.read()
+            if footer.summary_crc != zlib.crc32(summary[: -len(_MAGIC) - _CRC]):
+                return None  # a sum that was not made is 0, and tells nothing either
+            return _contents(_records(summary))
+        except (McapError, ValueError, EOFError, LookupError, UnicodeDecodeError):
+            return None
+
+
+def _records(data: bytes) -> list[Any]:
+    stream: Any = io.BytesIO(data)
+    return list(StreamReader(stream, skip_magic=True, record_size_limit=len(data)).records)
+
+
+def _contents(records: list[Any]) -> Contents | None:
+    found, stated = Contents(), None
+    for record in records:
+        if isinstance(record, Schema):
+            found.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            found.channels[record.id] = record
+        elif isinstance(record, Statistics):
+            stated = record
+    if stated is None or stated.channel_count != len(found.channels):
+        return None
+    found.counts = stated.channel_message_counts
+    if sum(found.counts.values()) != stated.message_count or not found.counts.keys() <= found.channels.keys():
+        return None
+    if any(channel.schema_id and channel.schema_id not in found.schemas for channel in found.channels.values()):
+        return None
+    found.first, found.last = stated.message_start_time, stated.message_end_time
+    return found

@@ -22,17 +22,8 @@ METADATA = "metadata.yaml"
 _HEAD = struct.Struct(">16xH10xI")  # of an SQLite file: bytes of a page, 1 for 65536, and how many pages
 
 
-class _Context:
-    """Makes a reader of rosbags a context that says when its messages came."""
-
-    def __enter__(self: Any) -> Any:
-        """Open."""
-        self.open()
-        return self
-
-    def __exit__(self: Any, *_: object) -> None:
-        """Close."""
-        self.close()
+class _Times:
+    """Makes a reader of rosbags say when its messages came."""
 
     @property
     def start_time(self: Any) -> int:
@@ -45,7 +36,7 @@ class _Context:
         return int(self.metadata.end_time)
 
 
-class Database(_Context, Sqlite3Reader):
+class Database(_Times, Sqlite3Reader):
     """One .db3 file."""
 
     path: Path
@@ -62,7 +53,7 @@ class Database(_Context, Sqlite3Reader):
         super().open()
 
 
-class Ros2Bag(_Context, DirectoryReader):
+class Ros2Bag(_Times, DirectoryReader):
     """A folder with metadata.yaml, which names its files."""
 
     path: Path

@@ -10,10 +10,9 @@ from pathlib import Path
 
 from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import opened
-from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.limits import LATEST
 from kurumaisu.critic.bags.parts import parts_of
-from kurumaisu.critic.bags.topics import Reading, absolute
+from kurumaisu.critic.bags.topics import absolute, shown
 
 # What the names of topics say about what they are, the likelier first; a name that none fits is the least likely.
 _LIKELY = {
@@ -63,7 +62,7 @@ def survey(path: Path) -> list[Found]:
     counts: dict[tuple[str, str], int] = {}
     start, end = LATEST, 0
     for bag in parts_of(path):
-        with Reading(bag), opened(bag) as opened_bag:
+        with opened(bag) as opened_bag:
             for connection in opened_bag.connections:
                 key = absolute(connection.topic), shown(connection.msgtype)
                 counts[key] = counts.get(key, 0) + connection.msgcount

@@ -10,19 +10,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.interfaces import Connection
+from rosbags.interfaces import Connection, ConnectionExtRosbag1, ConnectionExtRosbag2, MessageDefinitionFormat
+from rosbags.interfaces.typing import Typesdict
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from kurumaisu.critic.bags.containers import broken, opened
-from kurumaisu.critic.bags.decoding import decoder, shown
 from kurumaisu.critic.bags.messages import ScanRow
 from kurumaisu.critic.bags.parts import parts_of
-from kurumaisu.errors import Error
+from kurumaisu.errors import Error, told
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 Row = tuple[float, ...] | dict[str, float] | ScanRow
 Convert = Callable[[Any], Row | None]  # None: a message that says nothing of what is wanted
 _BEGINNING = 1e9  # [ns] within which a message was received of those that a clock stamped when it began
 Wanted = Mapping[str, Callable[[str], Convert]]
+_HEADER = "std_msgs/msg/Header"
+_RULE = "=" * 80 + "\n"  # between the definitions of IDL
 
 
 @dataclass
@@ -115,7 +118,7 @@ def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[Path, C
     Raise Error naming file and topic for what cannot be read.
     """
     for bag in parts_of(path):
-        with Reading(bag), opened(bag) as opened_bag:
+        with opened(bag) as opened_bag:
             chosen = [connection for connection in opened_bag.connections if absolute(connection.topic) in topics]
             decoders: dict[Any, Callable[[bytes], Any]] = {}
             for connection, received, data in opened_bag.messages(chosen) if chosen else ():
@@ -123,24 +126,6 @@ def read_messages(path: Path, topics: Collection[str]) -> Iterator[tuple[Path, C
                 if key not in decoders:
                     decoders[key] = decoder(bag, connection)
                 yield bag, connection, received, _decoded(bag, connection, decoders[key], data)
-
-
-class Reading:
-    """Turns whatever a parser trips over in a damaged file into an Error that names it."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def __enter__(self) -> None:
-        """Begin."""
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
-        """Raise Error in place of another exception."""
-        if error is None or isinstance(error, Error) or not isinstance(error, Exception):
-            return
-        if isinstance(error, OSError):
-            raise Error(f"{self._path}: {error.strerror or error}") from error
-        raise Error(f"{broken(self._path)}: {str(error) or type(error).__name__}") from error
 
 
 def absolute(topic: str) -> str:
@@ -160,3 +145,42 @@ def stamp_of(message: Any) -> int:
     """Return the stamp of a message [ns], 0 where it has none."""
     header = getattr(message, "header", None)
     return 0 if header is None else int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+
+
+def decoder(path: Path, connection: Connection) -> Callable[[bytes], Any]:
+    """Return a function from a message's bytes to the message.
+
+    Bags of ROS 2 before Iron carry no definitions; their types are those of Humble.
+    Raise Error naming file, topic and type of which nothing is known.
+    """
+    kind = connection.msgtype
+    ros1 = isinstance(connection.ext, ConnectionExtRosbag1)
+    if isinstance(connection.ext, ConnectionExtRosbag2) and connection.ext.serialization_format != "cdr":
+        encoding = told(connection.ext.serialization_format)
+        raise Error(f"{path}: {connection.topic}: its messages are encoded as {encoding}, not as those of ROS")
+    store = get_typestore(Stores.EMPTY)
+    if connection.msgdef.format == MessageDefinitionFormat.NONE:
+        store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        if kind not in store.fielddefs:
+            raise Error(f"{path}: {connection.topic}: the bag has no definition of its type {shown(kind)}")
+    elif connection.msgdef.format == MessageDefinitionFormat.IDL:
+        store.register(_idl(connection.msgdef.data))
+    else:
+        # Bags of 2010 call the header roslib/Header, so its definition is not found among theirs.
+        known = {_HEADER: get_typestore(Stores.ROS1_NOETIC).fielddefs[_HEADER]} if ros1 else {}
+        store.register({**known, **get_types_from_msg(connection.msgdef.data, kind)})
+    decode = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+    return lambda data: decode(data, kind)
+
+
+def shown(kind: str) -> str:
+    """Return a type as ROS 1 writes it."""
+    return kind.replace("/msg/", "/")
+
+
+def _idl(text: str) -> Typesdict:
+    parts = text.split(_RULE)[1:] if text.startswith(f"{_RULE}IDL: ") else [f"\n{text}"]
+    found: Typesdict = {}
+    for part in parts:
+        found.update(get_types_from_idl(part.partition("\n")[2]))
+    return found

@@ -7,7 +7,6 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -96,16 +95,10 @@ def _transforms(path: Path) -> Iterator[tuple[tuple[str, str], int, tuple[float,
         if connection.msgtype not in _TYPES:
             raise Error(f"{bag}: {connection.topic}: is of type {connection.msgtype}, which has no transforms")
         for item in message.transforms:
-            yield _of(item), *_row(item), connection.topic.endswith("static")
-
-
-def _of(item: Any) -> tuple[str, str]:
-    return item.header.frame_id.lstrip("/"), item.child_frame_id.lstrip("/")
-
-
-def _row(item: Any) -> tuple[int, tuple[float, ...]]:
-    place, turn = item.transform.translation, item.transform.rotation
-    return stamp_of(item), (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w)
+            frames = item.header.frame_id.lstrip("/"), item.child_frame_id.lstrip("/")
+            place, turn = item.transform.translation, item.transform.rotation
+            row = place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w
+            yield frames, stamp_of(item), row, connection.topic.endswith("static")
 
 
 def _matrices(rows: FloatArray) -> FloatArray:

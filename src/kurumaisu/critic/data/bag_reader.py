@@ -12,17 +12,14 @@ import numpy as np
 
 from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import bag_name
-from kurumaisu.critic.bags.decoding import shown
 from kurumaisu.critic.bags.messages import ScanRow
 from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
-from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
+from kurumaisu.critic.bags.topics import Convert, Topic, read_topics, shown
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
-from kurumaisu.critic.data.counters import Spans
 from kurumaisu.critic.data.meta import Meta
-from kurumaisu.critic.data.odometry import COLUMNS
-from kurumaisu.critic.data.wheel_reader import JOINTS, read_wheels
+from kurumaisu.critic.data.odometry import COLUMNS, JOINTS, Spans, read_wheels
 from kurumaisu.critic.imu.yaw_rate import UNUSED
 from kurumaisu.critic.values.recording import PARTS, Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kurumaisu.critic.values.digits import moment
+from kurumaisu.critic.values.digits import moment, times
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
@@ -65,10 +65,6 @@ class Table:
         """Return where a row is, in words."""
         return f"{self.row} {index + self.first}, t = {moment(self.t[index])}"
 
-    def select(self, index: BoolArray | IntArray) -> Series:
-        """Return chosen rows as a Series."""
-        return Series(self.t[index], self.values[index], self.columns)
-
 
 def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | None:
     """Return the rows in the order of time, or None when none is left.
@@ -86,7 +82,7 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     if not len(kept):
         faults.add(f"{table.where}: has no rows")
         return None
-    series = table.select(kept[np.argsort(table.t[kept], kind="stable")])
+    series = Series(table.t, table.values, table.columns).rows(kept[np.argsort(table.t[kept], kind="stable")])
     if ranges:
         return _ranges(table.where, series, faults)
     return _unwrapped(table.where, series, faults) if "theta" in table.columns else series
@@ -182,10 +178,9 @@ def _of_wrong_order(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
         return wrong
     setback = (np.maximum.accumulate(t) - t)[moved][~late & ~wrong[moved]]
     fatal = moved.sum() > HICCUP_SHARE * len(t) or bool((setback > HICCUP_TIME).any())
-    times = "once" if len(back) == 1 else f"{len(back)} times"
     ending = "the clock cannot be trusted" if fatal else "rows sorted"
     faults.add(
-        f"{table.where}: time goes backward {times}, by up to {-np.diff(t[~wrong]).min():.3g} s "
+        f"{table.where}: time goes backward {times(len(back))}, by up to {-np.diff(t[~wrong]).min():.3g} s "
         f"(first: {table.place(int(kept[~wrong][back[0] + 1]))}): {ending}",
         fatal=fatal,
     )
@@ -238,7 +233,7 @@ def _unwrapped(where: str, series: Series, faults: Faults) -> Series:
         if len(doubtful):
             faults.add(
                 f"{where}: theta turns by more than {LARGEST_TURN:g} rad between samples "
-                f"{_times(len(doubtful))} (first: t = {moment(series.t[doubtful[0]])}): the direction is a guess"
+                f"{times(len(doubtful))} (first: t = {moment(series.t[doubtful[0]])}): the direction is a guess"
             )
         # The same heading reads the same whatever multiple of a turn the file started from.
         theta = theta - 2 * np.pi * np.floor((theta[0] + np.pi) / (2 * np.pi))
@@ -249,7 +244,3 @@ def _unwrapped(where: str, series: Series, faults: Faults) -> Series:
 
 def _rows(count: int) -> str:
     return "1 row is" if count == 1 else f"{count} rows are"
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"

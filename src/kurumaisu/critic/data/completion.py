@@ -3,17 +3,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.headings import Guide, with_headings
 from kurumaisu.critic.data.odometry import COLUMNS, driven_by, rates_between
 from kurumaisu.critic.imu.yaw_rate import heading, with_yaw_rate
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
+from kurumaisu.geometry import wrap
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import FloatArray
+
+_SHORTEST = 0.05  # [m] least way whose direction is looked at, and
+_NOISES = 40.0  # times the noise of a position: a heading is known to 2 degrees then
+_LONGEST = 10.0  # [s] that a way may take
+_STEADY = 5.0  # [s] over which directions of ways are averaged beside a guide that is steady
+_LARGEST_TURN = 1.0  # [rad] within a way: the chord of an arc of even curvature points as its middle does
 
 
 def completed(run: Run, hold: float | None, faults: Faults, axis: str | None = None) -> Run:
@@ -67,12 +74,104 @@ def _guide_without_imu(run: Run) -> Guide | None:
         return Guide("the odometry", run.odom.t, run.odom.column("theta"), run.odom.column("v"))
     if run.command is None:
         return None
-    t, rates = _held(run.command)
+    # Held until the next, as rows between which they change evenly.
+    t = np.repeat(run.command.t, 2)[1:]
+    rates = np.repeat(np.column_stack([run.command.column("v"), run.command.column("w")]), 2, axis=0)[:-1]
     return Guide("the commands", t, driven_by(t, rates)[:, 2], rates[:, 0])
 
 
-def _held(command: Series) -> tuple[FloatArray, FloatArray]:
-    """Return times and rates that are held until the next, as rows between which they change evenly."""
-    rates = np.column_stack([command.column("v"), command.column("w")])
-    t = np.repeat(command.t, 2)[1:]
-    return t, np.repeat(rates, 2, axis=0)[:-1]
+@dataclass(frozen=True)
+class Guide:
+    """How a robot turned and which way it drove, roughly: times (n,) [s], headings (n,) [rad] from 0, v (n,) [m/s].
+
+    steady: it is a gyro, off by a bias and a share of its turns, and by little else within seconds.
+    """
+
+    name: str
+    t: FloatArray
+    theta: FloatArray
+    v: FloatArray
+    steady: bool = False
+
+    def speeds(self, at: FloatArray) -> FloatArray:
+        """Return v (m,) [m/s] at times at (m,), held from row to row."""
+        return np.asarray(self.v[np.clip(np.searchsorted(self.t, at, side="right") - 1, 0, None)])
+
+
+def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float]:
+    """Return positions x, y with theta, and over how long a way each heading was measured [m].
+
+    Directions of ways correct the guide's heading, which fills in between and while the robot stands; without a guide
+    headings are interpolated, and the robot is taken to drive forward.
+    Raise Error where there are not two ways.
+    """
+    t, places = positions.t, positions.values[:, :2]
+    way = max(_SHORTEST, _NOISES * _noise(places))
+    theta = np.zeros(len(t)) if guide is None else np.interp(t, guide.t, guide.theta)
+    ahead = np.ones(len(t)) if guide is None else np.sign(guide.speeds(t))
+    found = [
+        ((t[i] + t[j]) / 2, _course(places[j] - places[i], ahead[i]) - theta[i : j + 1].mean())
+        for i, j in _ways(t, places, theta, ahead, way)
+    ]
+    if len(found) < 2:
+        raise Error(f"has positions without headings, and no two ways of {way:.2g} m to tell headings from")
+    times, offsets = np.array(found).T
+    offsets = np.unwrap(offsets)
+    offsets -= offsets[0] - wrap(offsets[0])
+    if guide is not None and guide.steady:
+        turned = theta + _trend(times, offsets, theta[np.searchsorted(t, times)], t, theta)
+    else:
+        turned = theta + np.interp(t, times, offsets)
+    values = np.column_stack([places, turned])
+    return Series(t, values, ("x", "y", "theta")), way
+
+
+def _trend(times: FloatArray, offsets: FloatArray, at: FloatArray, t: FloatArray, theta: FloatArray) -> FloatArray:
+    """Return by how much a steady guide is off at times t (n,), when it says theta, by offsets (k,) where it says at.
+
+    What a bias and a share of its turns leave is averaged over some seconds.
+    """
+    scale = max(float(np.ptp(theta)), 1.0)
+
+    def columns(when: FloatArray, said: FloatArray) -> FloatArray:
+        return np.column_stack([np.ones(len(when)), (when - t[0]) / max(t[-1] - t[0], 1.0), said / scale])
+
+    known = columns(times, at)
+    found, *_ = np.linalg.lstsq(known, offsets, rcond=None)
+    left = offsets - known @ found
+    smooth = np.empty(len(times))
+    first, end = (np.searchsorted(times, times + side * 3 * _STEADY) for side in (-1, 1))
+    for i, near in enumerate(map(slice, first, end)):
+        weight = np.exp(-0.5 * ((times[near] - times[i]) / _STEADY) ** 2)
+        smooth[i] = weight @ left[near] / weight.sum()
+    return np.asarray(columns(t, theta) @ found + np.interp(t, times, smooth))
+
+
+def _noise(places: FloatArray) -> float:
+    """Return the sd of a position [m], from how far each is off the middle of its neighbours."""
+    if len(places) < 3:
+        return 0.0
+    off = places[1:-1] - (places[:-2] + places[2:]) / 2
+    return float(SIGMA_PER_MAD * np.median(np.abs(off - np.median(off, axis=0))) / np.sqrt(1.5))
+
+
+def _course(step: FloatArray, ahead: float) -> float:
+    return float(np.arctan2(step[1], step[0]) + (np.pi if ahead < 0 else 0.0))
+
+
+def _ways(t: FloatArray, places: FloatArray, theta: FloatArray, ahead: FloatArray, way: float) -> list[tuple[int, int]]:
+    """Return first and last rows of ways that follow each other, each as short as `way` [m] allows."""
+    found: list[tuple[int, int]] = []
+    i = 0
+    while i < len(t) - 1:
+        j = i + 1
+        while j < len(t) and np.hypot(*(places[j] - places[i])) < way and t[j] - t[i] < _LONGEST:
+            j += 1
+        inside = slice(i, j + 1)
+        if j < len(t) and t[j] - t[i] < _LONGEST and ahead[i] and (ahead[i:j] == ahead[i]).all():
+            if np.ptp(theta[inside]) < _LARGEST_TURN:
+                found.append((i, j))
+            i = j
+        else:
+            i += 1
+    return found

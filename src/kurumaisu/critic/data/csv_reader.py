@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Read a run from a folder of CSV tables, each with one header line."""
+"""Runs as folders of CSV tables, each with one header line, or trajectories of the TUM benchmark: read and written."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import csv
 import io
 import math
 from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,12 +17,13 @@ import numpy as np
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
 from kurumaisu.critic.data.odometry import with_wheels
-from kurumaisu.critic.data.tum_reader import SUFFIX, read_tum
 from kurumaisu.critic.imu.yaw_rate import ACCELERATIONS, RATE, RATES
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
 from kurumaisu.params import Robot
+from kurumaisu.plausible import yaw_or_nan
 from kurumaisu.types import FloatArray
+from kurumaisu.whole_files import write_whole
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -52,6 +54,8 @@ _HEADINGS = frozenset({"yaw", "heading", "th", "phi", "psi", "angle", "orientati
 _MOST_COLUMNS = 20_000  # of a table; a laser has some thousand beams
 _LONGEST_NAME = 200  # characters of a column's name
 _MOST_LISTED = 20  # names of columns in a message
+SUFFIX = ".tum"
+_NUMBERS = 8
 
 
 def is_csv_run(folder: Path) -> bool:
@@ -109,8 +113,9 @@ def check_queries(where: str, queries: FloatArray, first: int = 0) -> FloatArray
 def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | None, dict[str, Series]]:
     """Return the part itself and the covariates among its columns."""
     columns, rows, dropped = read_table(path, ("t", *REQUIRED[part]), OPTIONAL.get(part, ()))
-    if part == "pose":
-        _check_heading(path, columns)
+    other = next((name for name in columns if name.lower() in _HEADINGS), None) if part == "pose" else None
+    if "theta" not in columns and other is not None:  # which would pass for a covariate
+        raise Error(f"{path}:1: column 'theta' is missing: rename column {other!r} if it is the heading [rad]")
     for column in dropped:
         faults.add(f"{where}: column {column!r} is not read: it has no numbers")
     optional = tuple(name for name in OPTIONAL.get(part, ()) if name in columns)
@@ -131,24 +136,13 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
     covariates = {}
     for name in columns:
         if name not in ("t", *own):
-            covariate = _covariate(where, name, t, rows[:, columns.index(name)], faults)
+            one = rows[:, columns.index(name)]
+            given = ~np.isnan(one)
+            # Line numbers would be off by the empty cells, so rows are counted instead.
+            covariate = clean(Table(f"{where}: {name}", t[given], one[given, None], (name,), "value", 1), faults)
             if covariate is not None:
                 covariates[name] = covariate
     return series, covariates
-
-
-def _check_heading(path: Path, columns: list[str]) -> None:
-    """Raise Error where positions have a heading by another name, which would pass for a covariate."""
-    other = next((name for name in columns if name.lower() in _HEADINGS), None)
-    if "theta" not in columns and other is not None:
-        raise Error(f"{path}:1: column 'theta' is missing: rename column {other!r} if it is the heading [rad]")
-
-
-def _covariate(where: str, name: str, t: FloatArray, values: FloatArray, faults: Faults) -> Series | None:
-    """Return one column without its empty cells, or None when nothing is left."""
-    given = ~np.isnan(values)
-    # Line numbers would be off by the empty cells, so rows are counted instead.
-    return clean(Table(f"{where}: {name}", t[given], values[given, None], (name,), "value", 1), faults)
 
 
 def _merge(covariates: dict[str, Series], more: dict[str, Series], path: Path) -> None:
@@ -194,7 +188,9 @@ def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> 
         raise Error(f"{path}:1: has {len(columns)} columns, and at most {_MOST_COLUMNS} are read")
     for name in required:
         if name not in columns:
-            raise Error(f"{path}:1: column {name!r} is missing; there are: {_listed(columns)}")
+            more = f" and {len(columns) - _MOST_LISTED} more" if len(columns) > _MOST_LISTED else ""
+            listed = (", ".join(each[:_LONGEST_NAME] for each in columns[:_MOST_LISTED]) or "none") + more
+            raise Error(f"{path}:1: column {name!r} is missing; there are: {listed}")
     seen: set[str] = set()
     for name in columns:
         if not name or name in seen:
@@ -202,11 +198,6 @@ def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> 
         if len(name) > _LONGEST_NAME:
             raise Error(f"{path}:1: column {told(name)} has a name of more than {_LONGEST_NAME} characters")
         seen.add(name)
-
-
-def _listed(columns: list[str]) -> str:
-    more = f" and {len(columns) - _MOST_LISTED} more" if len(columns) > _MOST_LISTED else ""
-    return (", ".join(name[:_LONGEST_NAME] for name in columns[:_MOST_LISTED]) or "none") + more
 
 
 @dataclass
@@ -255,3 +246,66 @@ def _number(cell: str, blank: bool) -> float | None:
         return float(cell)
     except ValueError:
         return None
+
+
+def read_tum(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Return times (n,) [s] and poses (n, 3) of x, y [m], theta [rad], nan for a quaternion without a yaw.
+
+    Raise Error naming file and line for what is no such row.
+    """
+    rows = []
+    for number, line in enumerate(read_text(path, MOST_TABLE, "utf-8-sig").splitlines(), 1):
+        cells = line.split("#")[0].split()
+        if cells:
+            rows.append(_row(f"{path}:{number}", cells))
+    table = np.array(rows, dtype=np.float64).reshape(-1, _NUMBERS)
+    theta = [yaw_or_nan(*row[4:]) for row in table.tolist()]
+    return table[:, 0], np.column_stack([table[:, 1:3], theta])
+
+
+def _row(where: str, cells: list[str]) -> list[float]:
+    if len(cells) != _NUMBERS:
+        raise Error(f"{where}: has {len(cells)} numbers, and not the 8 of t x y z qx qy qz qw")
+    try:
+        return [float(cell) for cell in cells]
+    except ValueError:
+        raise Error(f"{where}: is not a row of numbers: {told(' '.join(cells))}") from None
+
+
+def write_csv_run(folder: Path, run: Run) -> None:
+    """Write a run into folder, which is made; reading it back gives the same arrays to the last bit.
+
+    The fan of a bag has no place in CSV: put it into meta.yaml. Raise Error naming what cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Error(f"{folder}: {error.strerror}") from error
+    tables = {}  # Python floats print with as many digits as it takes to read them back exactly
+    for part, series in run.parts().items():
+        tables[part] = csv_text(("t", *series.columns), np.column_stack([series.t, series.values]).tolist())
+    if run.covariates:
+        rows = _side_by_side(list(run.covariates.values()))
+        tables["covariate"] = csv_text(("t", *run.covariates), rows.tolist())
+    if run.queries is not None:
+        tables["query"] = csv_text(("t0", "t1"), run.queries.tolist())
+    write_whole({folder / f"{name}.csv": text for name, text in tables.items()})
+
+
+def _side_by_side(covariates: Sequence[Series]) -> FloatArray:
+    """Return rows (n, 1 + covariates), one per time of any sample, nan where a covariate has none."""
+    t = np.unique(np.concatenate([series.t for series in covariates]))
+    rows = np.full((len(t), 1 + len(covariates)), np.nan)
+    rows[:, 0] = t
+    for i, series in enumerate(covariates):
+        rows[np.searchsorted(t, series.t), i + 1] = series.values[:, 0]
+    return rows
+
+
+def csv_text(columns: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
+    """Return a table with a line for the names of its columns."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(rows)
+    return text.getvalue()

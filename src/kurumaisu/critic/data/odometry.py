@@ -1,22 +1,37 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What odometry says where it was left unsaid: rates out of poses, and poses out of wheels."""
+"""What odometry says where it was left unsaid: rates out of poses, poses out of wheels that tables or bags tell of."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.counters import Counter, Spans, counted
+from kurumaisu.critic.bags.topics import absolute, read_topics, shown
+from kurumaisu.critic.data.clean import HICCUP_SHARE, Faults
+from kurumaisu.critic.values.digits import moment, times
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
+from kurumaisu.names import hint
 from kurumaisu.params import Robot
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 COLUMNS = ("x", "y", "theta", "v", "w")
 WHEEL_TABLES = ("wheels", "wheel_rates")  # of angles or ticks, of rates
+Spans = tuple[tuple[float, float], ...]
+_RANGES = (2.0**8, 2.0**16, 2.0**32)  # of counters, beside a turn of the wheel
+_FASTER = 1.5  # times the largest of the other steps that a wheel may take
+_ANEW = 10.0  # times that which a jump from or to 0 has at least, and
+_NEAR = 0.1  # share of the jump by which one end of it may be off 0
+_LEAST = 0.1  # [rad] that any wheel may turn in a step, or
+_LEAST_SHARE = 1 / 16  # of the range
+_FASTEST = 100.0  # [m/s] no wheel drives faster
+JOINTS = "sensor_msgs/msg/JointState"
 
 
 @dataclass(frozen=True)
@@ -121,3 +136,167 @@ def along(arcs: FloatArray) -> FloatArray:
     course, chord = (theta[1:] + theta[:-1]) / 2, arcs[:, 0] * np.sinc(arcs[:, 1] / (2 * np.pi))
     x, y = (np.append(0.0, np.cumsum(chord * f(course))) for f in (np.cos, np.sin))
     return np.stack([x, y, theta], axis=1)
+
+
+@dataclass(frozen=True)
+class Counter:
+    """A counter: where it is read, in words; how far its wheel turns for 1 [rad], and drives [m]."""
+
+    where: str
+    turn: float
+    way: float
+
+
+def counted(counter: Counter, t: FloatArray, counts: FloatArray, faults: Faults) -> tuple[FloatArray, Spans]:
+    """Return counts (n,) at times (n,) [s] without overflows, and spans [s] in which it is not known what was counted.
+
+    An overflow is a jump to the other end of the smallest range that holds all counts, if the wheel, had it turned past
+    that end, would not have turned faster than elsewhere, but otherwise much faster. In other jumps nothing is counted.
+    faults gets the jumps of each kind: how many, and where the first is.
+    """
+    steps = np.diff(counts)
+    if not len(steps):
+        return counts, ()
+    whole = 2 * np.pi / counter.turn
+    size = _range(counts, whole)
+    around = np.where(np.abs(steps) > size / 2, steps - np.sign(steps) * size, steps)
+    overflows, unsure, jumps = _jumps(counter, t, counts, around, size)
+    lost = unsure | jumps
+
+    def tell(which: BoolArray, what: str, so: str) -> None:
+        if which.any():
+            first = int(np.argmax(which))
+            place = f"from {counts[first]:.10g} to {counts[first + 1]:.10g} at t = {moment(float(t[first + 1]))}"
+            faults.add(f"{counter.where}: {what}, {times(int(which.sum()))} (first: {place}): {so}")
+
+    kind = "begins each turn of the wheel anew" if size == whole else f"overflows, as it counts to {size:.0f}"
+    tell(overflows, kind, "it is counted on")
+    tell(unsure, "may have turned either way", "that time is left out")
+    tell(jumps, "jumps, which is neither an overflow nor motion", "that time is left out")
+    if lost.sum() > HICCUP_SHARE * len(lost):
+        faults.add(
+            f"{counter.where}: it is too often not known what was counted: {lost.sum()} of {len(lost)}", fatal=True
+        )
+    moved = np.where(lost, 0.0, np.where(overflows, around, steps))
+    return counts[0] + np.append(0.0, np.cumsum(moved)), tuple(
+        (float(t[i]), float(t[i + 1])) for i in np.flatnonzero(lost)
+    )
+
+
+def _range(counts: FloatArray, whole: float) -> float:
+    """Return the smallest range that holds all counts, from 0 or from minus its half; inf: there is none."""
+    low, high = float(counts.min()), float(counts.max())
+    for size in sorted({*_RANGES, whole}):
+        slack = 1e-3 * size if size == whole else 0.0  # angles are rounded
+        if (low >= -slack and high <= size + slack) or (low >= -size / 2 - slack and high <= size / 2 + slack):
+            return size
+    return float("inf")
+
+
+def _jumps(
+    counter: Counter, t: FloatArray, counts: FloatArray, around: FloatArray, size: float
+) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Return which steps are overflows, which may have gone either way, and which are no motion, (n - 1,) each.
+
+    around: the steps, or the shorter way past the end of the range.
+    """
+    steps, lasts = np.abs(np.diff(counts)), np.diff(t)
+    usual = float(np.median(lasts))
+    slow = np.maximum(lasts / usual, 1.0)
+    over = steps > size / 2
+    at_zero = np.minimum(np.abs(counts[:-1]), np.abs(counts[1:])) <= _NEAR * steps
+    wild = steps * counter.way > _FASTEST * usual * slow
+    others = (steps / slow)[~(over | at_zero | wild)]
+    least = max(float(others.max(initial=0.0)), min(_LEAST / counter.turn, _LEAST_SHARE * size))
+    may = _FASTER * slow * least
+    possible = np.abs(around) <= may
+    overflows = over & possible & (steps > may)
+    unsure = over & possible & (steps <= may)
+    if overflows.any():  # then any step may have gone around
+        unsure |= ~over & (size - steps <= may)
+    jumps = (over & ~possible & (steps > may)) | (at_zero & (steps > _ANEW * slow * least)) | wild
+    return overflows, unsure, jumps & ~overflows & ~unsure
+
+
+@dataclass(frozen=True)
+class _Wheel:
+    """A joint or topic, and what it says (n,) at increasing times (n,) [s]."""
+
+    name: str
+    t: FloatArray
+    values: FloatArray
+
+
+def read_wheels(path: Path, wheels: Wheels, faults: Faults) -> tuple[FloatArray, FloatArray, Spans]:
+    """Return times (n,) [s], rows (n, 5) of x, y, theta, v, w, beginning at 0, and spans [s] that are not known.
+
+    Angles or ticks of joints are used where they are given, else rates. faults gets jumps of what is counted.
+    Raise Error naming file, topic and joint.
+    """
+    said, counts = _joints(path, wheels) if wheels.topic else _topics(path, wheels)
+    lost: set[tuple[float, float]] = set()
+    for i, wheel in enumerate(said if counts else ()):
+        values, spans = counted(wheels.counter(f"{path.name} wheels: {wheel.name}"), wheel.t, wheel.values, faults)
+        said[i] = _Wheel(wheel.name, wheel.t, values)
+        lost.update(spans)
+    t = said[0].t
+    at = np.array([np.interp(t, wheel.t, wheel.values) for wheel in said])
+    lefts = len(wheels.left)
+    sides = np.stack([at[:lefts].mean(axis=0), at[lefts:].mean(axis=0)], axis=1)
+    if counts:
+        return t, wheels.odometry(t, sides, tuple(sorted(lost))), tuple(sorted(lost))
+    rates = wheels.motion(sides)
+    return t, np.column_stack([driven_by(t, rates), rates]), ()
+
+
+def _joints(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
+    """Return the joints of the left and then the right side, and whether they say angles or ticks."""
+    names = (*wheels.left, *wheels.right)
+    seen: set[str] = set()
+    topic = absolute(wheels.topic)
+
+    def convert(message: Any) -> tuple[float, ...] | None:
+        seen.update(message.name)
+        return None if any(name not in message.name for name in names) else _of(message, names)
+
+    def converter(kind: str) -> Any:
+        if kind != JOINTS:
+            raise Error(f"is of type {shown(kind)}, not of {shown(JOINTS)}")
+        return convert
+
+    found = read_topics(path, {topic: converter})
+    if topic not in found:
+        for name in names:
+            if seen and name not in seen:
+                raise Error(f"{path}: wheels: {topic} has no joint {name!r}; {hint(name, sorted(seen))}")
+        raise Error(f"{path}: wheels: {topic} says nothing of the wheels: there is no such topic, or no message")
+    t, rows = found[topic].times(), found[topic].rows()
+    angles, rates = rows[:, : len(names)], rows[:, len(names) :]
+    counts = bool(np.isfinite(angles).all())
+    values = angles if counts else rates
+    known = np.isfinite(values).all(axis=1) & np.r_[True, np.diff(t) > 0]
+    return [_Wheel(name, t[known], values[known, i]) for i, name in enumerate(names)], counts
+
+
+def _of(message: Any, names: Sequence[str]) -> tuple[float, ...]:
+    """Return the angles of some joints, and then their rates, nan where they are not given."""
+    places = [message.name.index(name) for name in names]
+    given = [
+        values if len(values) == len(message.name) else [math.nan] * len(message.name)
+        for values in (message.position, message.velocity)
+    ]
+    return tuple(float(values[place]) for values in given for place in places)
+
+
+def _topics(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
+    """Return the topics of the left and then the right side, and whether they count ticks."""
+    names = [absolute(name) for name in (*wheels.left, *wheels.right)]
+    found = read_topics(path, dict.fromkeys(names, lambda _: lambda message: (float(message.data),)))
+    for name in names:
+        if name not in found:
+            raise Error(f"{path}: wheels: there is no topic {name}; for joints of a JointState, say wheels.topic too")
+    said = []
+    for name in names:
+        times, order = np.unique(found[name].times(), return_index=True)
+        said.append(_Wheel(name, times, found[name].rows()[order, 0]))
+    return said, wheels.ticks_per_turn is not None

@@ -5,27 +5,30 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+
+import numpy as np
 
 from kurumaisu.critic.bags.containers import SUFFIXES, bag_name, is_bag
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.topics import Topic
 from kurumaisu.critic.data.bag_reader import PutAside, inventory, read_bag_run, resolve
-from kurumaisu.critic.data.carmen_reader import is_carmen, read_carmen_run
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.completion import completed
-from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.csv_reader import QUERY, is_csv_run, read_csv_run, read_queries
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut
+from kurumaisu.critic.data.log_reader import is_carmen, is_rawlog, rawlog_name, read_carmen_run, read_rawlog_run
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
-from kurumaisu.critic.data.rawlog_reader import is_rawlog, rawlog_name, read_rawlog_run
-from kurumaisu.critic.values.recording import PARTS, LaserMount, Recording, Run
+from kurumaisu.critic.values.recording import LONGEST_HOLD, LaserMount, Recording, Run, Series
 from kurumaisu.critic.values.selection import matching
 from kurumaisu.errors import Error
 from kurumaisu.names import hint
 from kurumaisu.params import Robot
 
 META = "meta.yaml"
+# No laser of this kind sees further: ranges whose median is above it are millimetres.
+FARTHEST_MEDIAN = 100.0
 
 
 def read_recording(
@@ -191,5 +194,47 @@ def require_use(path: Path | str, runs: Sequence[Run], meta: Meta, faults: Fault
 
 
 def _has(run: Run) -> str:
-    parts = [part for part in PARTS if getattr(run, part) is not None]
+    parts = run.parts()
     return f"only {' and '.join(parts)}" if parts else "no part of a run"
+
+
+def usable(run: Run) -> bool:
+    """Tell whether a run says something about base or laser."""
+    driven = run.command is not None or run.voltage is not None
+    measured = run.pose is not None or run.imu is not None
+    followed = measured or run.odom is not None or run.queries is not None
+    return run.scan is not None or (driven and followed) or (run.odom is not None and measured)
+
+
+def check_run(run: Run, laser: LaserMount | None, faults: Faults) -> None:
+    """Report parts that do not fit together. Raise Error for scans that are not of the laser of meta.yaml."""
+    _check_overlap(run, faults)
+    if run.scan is not None:
+        _check_scan(run, run.scan, laser, faults)
+
+
+def _check_overlap(run: Run, faults: Faults) -> None:
+    parts = run.parts("command", "voltage", "pose", "odom", "scan")
+    ends = {n: float(part.t[-1]) + (LONGEST_HOLD if n in ("command", "voltage") else 0.0) for n, part in parts.items()}
+    words = {name: f"{name} ({part.t[0]:.6g} to {part.t[-1]:.6g} s)" for name, part in parts.items()}
+    for a, b in combinations(parts, 2):
+        if parts[a].t[0] > ends[b] or parts[b].t[0] > ends[a]:
+            faults.add(f"{run.name}: {words[a]} and {words[b]} were not recorded at the same time", fatal=True)
+
+
+def _check_scan(run: Run, scan: Series, laser: LaserMount | None, faults: Faults) -> None:
+    beams = scan.values.shape[1]
+    if laser is not None and beams != laser.beams:
+        raise Error(f"{run.name}: scans have {beams} beams, but meta.yaml says laser.beams: {laser.beams}")
+    finite = scan.values[np.isfinite(scan.values)]
+    if len(finite) and np.median(finite) > FARTHEST_MEDIAN:
+        faults.add(f"{run.name}: ranges around {np.median(finite):.4g}: millimetres, not metres?", fatal=True)
+    if laser is None or run.fan is None:
+        return
+    first = run.fan.angle_min - laser.angle_min
+    last = first + (run.fan.angle_increment - laser.angle_increment) * (beams - 1)
+    if max(abs(first), abs(last)) > abs(laser.angle_increment) / 4:
+        faults.add(
+            f"{run.name}: angles of the scans differ from those of meta.yaml by {first:.2g} rad at the first beam "
+            f"and {last:.2g} rad at the last"
+        )

@@ -30,7 +30,7 @@ from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
 from kurumaisu.critic.engine.form_error import SHARES, form_errors
 from kurumaisu.critic.engine.step_likelihood import StartValues, Walked
 from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
-from kurumaisu.critic.values.prior import Z_USUAL, in_proportion, log_prior, occam, occam_plane
+from kurumaisu.critic.values.policy import Z_USUAL, in_proportion, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 

@@ -18,7 +18,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.catalogue import Term, settings_of
 from kurumaisu.critic.engine.covariance import without
-from kurumaisu.critic.values.settings import Settings
+from kurumaisu.critic.values.criticism import Settings
 from kurumaisu.types import FloatArray
 
 if TYPE_CHECKING:

@@ -16,8 +16,7 @@ from kurumaisu import program, settings
 from kurumaisu.critic.engine.catalogue import Candidate, Term, candidates, catalogue
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import design
-from kurumaisu.critic.experiment.design import Explanation
-from kurumaisu.critic.experiment.proposal import drives
+from kurumaisu.critic.experiment.design import Explanation, drives
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.errors import Error, failed

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,9 +12,9 @@ from kurumaisu import geometry
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, pieces, split
 from kurumaisu.critic.base.sensitivity import free_columns
-from kurumaisu.critic.heldout import noise_floor
 from kurumaisu.critic.heldout.materiality import spans
 from kurumaisu.critic.noise.base_noise import Noise, whitened
+from kurumaisu.critic.predict.motion import Paths, motion_ahead
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -25,6 +25,7 @@ PARTS = 4  # of a single run, of which each is held out in turn
 BLOCK = 5.0  # [s] resampled as a whole: at least ten time constants of the usual process noise
 _DRAWS = 2000
 _GAP = 1.0  # [s] between poses, beyond which poses are withheld
+_STARTS = 8  # per drive and horizon
 
 
 @dataclass(frozen=True)
@@ -82,10 +83,10 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
     for fold in splits:
         extension = refit(fold.train)
         for drive in fold.test:
-            for horizon, squares in noise_floor.squares(drive, model, extension.settings, extended, HORIZONS):
-                floors[horizon].append(squares)
+            for horizon, floor in _squares_by_noise(drive, model, extension.settings, extended):
+                floors[horizon].append(floor)
             for side, (fitted, noise) in enumerate(((FittedExtension(()), baseline), (extension, extended))):
-                density[side].extend(_blocks(drive, _log_density(drive, model, fitted, noise)))
+                density[side].extend(blocks(drive, _log_density(drive, model, fitted, noise)))
                 for horizon in HORIZONS:
                     errors[horizon][side].extend(_open_loop(drive, model, fitted.settings, horizon))
     rmse = {
@@ -143,7 +144,7 @@ def _surprise(innovations: FloatArray, columns: FloatArray) -> FloatArray:
     return out
 
 
-def _blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
+def blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
     """Return per-increment values cut into blocks of BLOCK seconds."""
     index = ((drive.times[1:] - drive.times[0]) // BLOCK).astype(int)
     return [values[index == i] for i in np.unique(index)]
@@ -161,16 +162,16 @@ def _open_loop(drive: Drive, model: Model, settings: Sequence[EffectSetting], ho
     return [squares[index == i] for i in np.unique(index)]
 
 
-def _resample(blocks: int) -> FloatArray:
-    """Return bootstrap weights of blocks, (_DRAWS, blocks)."""
-    rng = np.random.default_rng(0)
-    return np.asarray(rng.multinomial(blocks, np.full(blocks, 1 / blocks), size=_DRAWS), dtype=np.float64)
+def _drawn(baseline: list[FloatArray], extended: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Return sums of both sides and counts of blocks (m, 3), and the same (_DRAWS, 3) of blocks drawn again."""
+    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
+    weights = np.random.default_rng(0).multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=_DRAWS)
+    return sums, weights.astype(np.float64) @ sums
 
 
 def log_density_gain(baseline: list[FloatArray], extended: list[FloatArray]) -> LogDensityGain:
     """Return the gain per sample from blocks of log densities; blocks are resampled whole for its interval."""
-    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
-    drawn = _resample(len(sums)) @ sums
+    sums, drawn = _drawn(baseline, extended)
     lo, hi = np.quantile((drawn[:, 1] - drawn[:, 0]) / drawn[:, 2], [0.05, 0.95])
     b, e = sums[:, :2].sum(axis=0) / sums[:, 2].sum()
     return LogDensityGain(float(b), float(e), float(e - b), float(lo), float(hi))
@@ -178,9 +179,26 @@ def log_density_gain(baseline: list[FloatArray], extended: list[FloatArray]) -> 
 
 def rmse_gain(baseline: list[FloatArray], extended: list[FloatArray], unit: str) -> RmseGain:
     """Return the gain from blocks of squared errors; blocks are resampled whole for its interval."""
-    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
-    drawn = _resample(len(sums)) @ sums
+    sums, drawn = _drawn(baseline, extended)
     gains = np.sqrt(drawn[:, 0] / drawn[:, 2]) - np.sqrt(drawn[:, 1] / drawn[:, 2])
     lo, hi = np.quantile(gains, [0.05, 0.95])
     b, e = np.sqrt(sums[:, :2].sum(axis=0) / sums[:, 2].sum())
     return RmseGain(float(b), float(e), float(b - e), float(lo), float(hi), unit)
+
+
+def _squares_by_noise(
+    drive: Drive, model: Model, settings: Sequence[EffectSetting], noise: Noise
+) -> Iterator[tuple[float, float]]:
+    """Yield horizons [s] and mean squared errors of the position [m^2] that noise alone makes, from some poses.
+
+    From one pose as the reference gives it to another: nothing is known of how the noise was before.
+    """
+    paths = Paths(drive, model, tuple(settings), ())
+    for horizon in HORIZONS:
+        starts, ends = spans(drive, horizon)
+        few = np.unique(np.linspace(0, len(starts) - 1, _STARTS).astype(int)) if len(starts) else []
+        for i in few:
+            row = slice(starts[i], starts[i] + 1)
+            alone = drive.seen_at(drive.times[row], drive.poses[row])
+            ahead = motion_ahead(alone, paths, noise, float(drive.times[starts[i]]), float(drive.times[ends[i]]))
+            yield horizon, float(ahead.covariance[0, 0] + ahead.covariance[1, 1])

@@ -3,21 +3,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.heldout.drive_gain import PARTS, log_density_gain, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
-from kurumaisu.critic.predict.scan import OUTLIER, Expected, Joint, ScanModel, scattered
-from kurumaisu.critic.predict.scan_cache import Expectations
+from kurumaisu.critic.predict.scan import (
+    OUTLIER,
+    Expected,
+    Joint,
+    ScanModel,
+    expected_from,
+    scattered,
+    shifted_hits,
+    without_random,
+)
 from kurumaisu.critic.predict.scan_poses import ScanPoses, chosen, joined
-from kurumaisu.critic.ranges.scans.beams import Shots
+from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.scans.gathering import why_not_usable
+from kurumaisu.critic.values.criticism import Settings
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.settings import Settings
 from kurumaisu.critic.values.verdict import ChannelGain
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -29,7 +38,10 @@ _STEP = 0.05  # of a parameter, as a share of its distance from the null, to see
 _PARTS_OF_STEP = (1.0, 0.5, 0.25, 0.125)  # that are tried
 _VAGUE = 1.0  # sd of a parameter before it is fitted again, as a share of the same
 
+_Value = TypeVar("_Value")
 _Key = tuple[str, str]  # an effect and a parameter of it
+_MOST = 24  # models whose expectations are kept: 3 MB each for 60 scans
+_PLACES = 2  # likewise of what beams meet: 18 MB
 
 
 @dataclass(frozen=True)
@@ -93,7 +105,7 @@ def _side(split: Split, settings: Settings) -> _Side:
 
 def _splits(recording: Recording, model: Model, forecast: Forecast | None) -> Iterator[Split]:
     places = ScanPoses(recording, model, forecast)
-    parts = places.trained()
+    parts = [shots for _, shots in places.trained_runs()]
     tests = [run for run in recording.runs if run.name in recording.test and run.pose]
     picked = [(run, *chosen(run, _SCANS)) for run in tests]
     held = [places.of(run, stamps, measured) for run, stamps, measured in picked if len(stamps)]
@@ -161,3 +173,46 @@ def _with(settings: Settings, values: dict[_Key, float]) -> Settings:
         EffectSetting(s.id, {name: values.get((s.id, name), value) for name, value in s.parameters.items()})
         for s in settings
     )
+
+
+class Expectations:
+    """Expected readings of some shots; no scan's depend on which others there are."""
+
+    def __init__(self, shots: Shots) -> None:
+        self.shots = shots
+        self._own = {setting.id for setting in shots.own}
+        self._plain: dict[Hashable, Settings] = {}
+        self._expected: dict[Hashable, Expected] = {}
+        self._looks: dict[Hashable, list[BeamHits]] = {}
+
+    def of(self, settings: Settings) -> Expected:
+        """Return what the shots are to read with these effects."""
+        plain = _known(self._plain, settings, np.inf, lambda: tuple(without_random(self.shots, settings)))
+        return _known(self._expected, plain, _MOST, lambda: expected_from(self.shots, plain, self._seen(plain)))
+
+    def rows(self, settings: Settings, rows: IntArray) -> Expected:
+        """Return the same of some of the scans."""
+        what = self.of(settings)
+        return Expected(what.mean[rows], what.parts[:, rows], what.shared[rows], what.place[rows])
+
+    def _seen(self, settings: Settings) -> list[BeamHits]:
+        """Return looks, which effects that act on readings alone do not change."""
+        reads = [issubclass(effects.by_id(each.id), effects.ReadingEffect) for each in settings]
+        placing = [one for one, alone in zip(settings, reads, strict=True) if one.id in self._own or not alone]
+        return _known(self._looks, placing, _PLACES, lambda: shifted_hits(self.shots, settings))
+
+
+def _known(
+    known: dict[Hashable, _Value], by: Sequence[EffectSetting], most: float, make: Callable[[], _Value]
+) -> _Value:
+    """Return what is known by some effects, made if need be; most: that are kept, besides the first.
+
+    That is what is without effects, to which all are compared.
+    """
+    key = tuple((each.id, tuple(sorted(each.parameters.items()))) for each in by)
+    if key not in known:
+        found = make()
+        if len(known) >= most:
+            del known[list(known)[1]]
+        known[key] = found
+    return known[key]

@@ -1,26 +1,32 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What an extension is worth downstream: the same SLAM run with odometry and laser of the old and the new model."""
+"""What an extension is worth beyond the motion: on scans held out, and to the same SLAM run with both models."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kurumaisu import geometry, slam_score
+from kurumaisu import effects, geometry, slam_score
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates_but_place
-from kurumaisu.critic.base.drive import Drive, driven, prepare_all
-from kurumaisu.critic.heldout.corrected_scans import Corrected, corrected
+from kurumaisu.critic.base.drive import driven, prepare_all
+from kurumaisu.critic.heldout import scan_gain
 from kurumaisu.critic.heldout.drive_gain import BLOCK, rmse_gain
-from kurumaisu.critic.ranges.scans.gathering import laser_of
+from kurumaisu.critic.predict.motion import Forecast
+from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
+from kurumaisu.critic.ranges.scans.beams import acts_on_readings
+from kurumaisu.critic.ranges.scans.gathering import laser_of, why_not_usable
+from kurumaisu.critic.values.criticism import Criticism, Settings
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.critic.values.verdict import SlamGain
+from kurumaisu.critic.values.story import Overlay
+from kurumaisu.critic.values.verdict import Cause, ChannelGain, Gain, SlamGain
+from kurumaisu.effects import Beams, Echoes
 from kurumaisu.errors import Error
-from kurumaisu.params import EffectSetting, Model, shipped
+from kurumaisu.params import EffectSetting, Laser, Model, shipped
 from kurumaisu.types import FloatArray
 
 if TYPE_CHECKING:  # loading MRPT takes a third of a second, which most recordings need not pay
@@ -32,17 +38,16 @@ _LEAST_APART = 0.15  # [s] between them, where there are more than that
 _GAP = 0.5  # [s] between poses over which the reference is not interpolated
 _SEEDS = (1, 2)  # of the particle filter: its path is drawn
 Refit = Callable[[str], Sequence[EffectSetting]]  # what extends the model, fitted without the run of this name
+_ROUNDS = 4  # of an inversion whose error falls by the effects' relative size each time
 
 
 @dataclass(frozen=True)
 class Downstream:
-    """gain: None where SLAM was not run, for the reason told; paths (n, 2) [m] in the reference's frame."""
+    """gain, picture: None where SLAM was not run, for the reason told; paths in the reference's frame."""
 
     sentence: str
     gain: SlamGain | None = None
-    measured: FloatArray | None = None
-    baseline: FloatArray | None = None
-    extended: FloatArray | None = None
+    picture: Overlay | None = None
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,9 @@ def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Dow
         blocks = [_blocks(side, i) for side in sides]
         gains.append(rmse_gain(blocks[0], blocks[1], unit))
     gain = SlamGain(run.name, len(sides[0].times), *gains)
-    return Downstream(sentence(gain), gain, sides[0].truth[:, :2], sides[0].poses[:, :2], sides[1].poses[:, :2])
+    measured, before, after = (path[:, :2] for path in (sides[0].truth, sides[0].poses, sides[1].poses))
+    picture = Overlay(f"SLAM on {run.name}", measured, before, after, run.name in recording.test, restart=0.0)
+    return Downstream(sentence(gain), gain, picture)
 
 
 def sentence(gain: SlamGain) -> str:
@@ -140,21 +147,11 @@ def _rows(run: Run) -> list[int]:
 def _log(run: Run, model: Model, settings: Sequence[EffectSetting], scans: Corrected) -> ScanLog:
     slam = import_module("kurumaisu.slam")
     drive = with_covariates_but_place(prepare_all(run, model, float(scans.stamps[-1]) + 1.0), run)
-    times, poses = replay.odometry(_begun(drive), model, settings)
-    fan = slam.Fan(
-        angle_min=scans.angle_min,
-        angle_increment=scans.angle_increment,
-        time_increment=scans.time_increment,
-        range_max=scans.range_max,
-        base_from_laser=scans.mount,
-    )
+    begun = drive.seen_at(drive.times[:1], drive.poses[:1])  # nothing of the reference but where it begins
+    times, poses = replay.odometry(begun, model, settings)
+    fan = slam.Fan(**scans.fan)
     log: ScanLog = slam.scan_log(run.name, scans.stamps, scans.ranges.astype(np.float32), fan, times, poses)
     return log
-
-
-def _begun(drive: Drive) -> Drive:
-    """Return the drive with nothing of the reference but where it begins."""
-    return drive.seen_at(drive.times[:1], drive.poses[:1])
 
 
 def _mapped(log: ScanLog, reference: Series) -> _Path:
@@ -174,3 +171,139 @@ def _mapped(log: ScanLog, reference: Series) -> _Path:
 def _blocks(side: _Path, column: int) -> list[FloatArray]:
     index = ((side.times - side.times[0]) // BLOCK).astype(int)
     return [side.squares[:, index == i, column].ravel() for i in np.unique(index)]
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """stamps (n,) [s] at which the scans began, ranges (n, b) [m] on the level, and the fan as SLAM has it."""
+
+    stamps: FloatArray
+    ranges: FloatArray
+    fan: dict[str, Any]
+
+
+def corrected(
+    recording: Recording,
+    run: Run,
+    rows: Sequence[int],
+    model: Model,
+    settings: Sequence[EffectSetting],
+    *,
+    known: bool,
+) -> Corrected:
+    """Return some scans of a run, freed of what model and effects say that the laser does to them on the mean.
+
+    How obliquely a beam meets its wall is not known here: effects of that stay in. known: whether the model's law of
+    the laser is that of this one; else readings are taken for ranges.
+    """
+    assert run.scan is not None
+    laser = laser_of(model.laser, recording.laser, recording.runs)
+    given = {setting.id for setting in settings}
+    own = (own for own in model.effects if own.id not in given)
+    every = tuple(s for s in (*own, *settings) if acts_on_readings(s.id) and _steady(laser, s))
+    chain = effects.build_laser(every, np.random.default_rng(0))
+    stamps = run.scan.t[list(rows)]
+    flat = np.zeros(laser.beams)
+    said = laser.time_increment * np.arange(laser.beams)
+    mount = np.array([laser.mount.x, laser.mount.y, laser.mount.yaw])
+    begun = float(run.scan.t[0])
+    beams = [chain.aim(Beams(t, t + said, mount, laser.mount.z, laser.bearings, flat, begun)) for t in stamps.tolist()]
+    readings = run.scan.values[list(rows)]
+    first = laser.error.range(readings) if known else readings
+    ranges = np.array([_ranges(laser, chain, t, start) for t, start in zip(stamps.tolist(), first, strict=True)])
+    level = ranges * np.cos(np.array([each.elevations for each in beams]))
+    one = beams[len(beams) // 2]
+    fan = {
+        "angle_min": float(one.bearings[0]),
+        "angle_increment": float((one.bearings[-1] - one.bearings[0]) / (laser.beams - 1)),
+        "time_increment": float((one.times[-1] - one.times[0]) / (laser.beams - 1)),
+        "range_max": laser.range_max if known else float(np.nanmax(readings, initial=0.0, where=readings < np.inf)),
+        "base_from_laser": one.mount.tolist(),
+    }
+    return Corrected(np.array([float(each.times[0]) for each in beams]), level, fan)
+
+
+def _steady(laser: Laser, setting: EffectSetting) -> bool:
+    """Tell whether an effect does the same to every laser: nobody can undo what is drawn."""
+    flat = np.ones(laser.beams)
+    echoes = Echoes(0.0, laser.bearings, flat, 0 * flat, flat, flat, flat, 0 * flat, flat)
+    drawn = [effects.build_laser((setting,), np.random.default_rng(seed)).read(echoes) for seed in (0, 1)]
+    return np.array_equal(drawn[0], drawn[1], equal_nan=True)
+
+
+def _ranges(laser: Laser, chain: effects.LaserChain, stamp: float, start: FloatArray) -> FloatArray:
+    """Return the ranges (b,) [m] that the chain makes readings of, from a first guess; inf and nan stay."""
+    if chain.empty:
+        return start
+    hit = np.isfinite(start)
+    guess, zero, one = np.where(hit, start, 1.0), np.zeros_like(start), np.ones_like(start)
+    # The model's own law is undone by the first guess; what the effects add to it is taken off in turn.
+    for _ in range(_ROUNDS):
+        mean, sd = laser.error.mean(guess), laser.error.deviation(guess)
+        seen = chain.read(Echoes(stamp, laser.bearings, guess, zero, one, mean, sd, zero, guess))
+        guess = np.where(hit, start - (seen - mean), 1.0)
+    return np.where(hit, guess, start)
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What extends a model. forecast: of the base, None where nothing drove it; scans: the laser's and the map's.
+
+    refit: returns the base's part as fitted without the run of a name; points: causes of a confounded set that put the
+    reference elsewhere than base_link, as they would be.
+    """
+
+    forecast: Forecast | None
+    scans: Settings
+    refit: Callable[[str], Settings]
+    points: tuple[Cause, ...] = ()
+
+    @property
+    def empty(self) -> bool:
+        """Tell whether nothing was found."""
+        return not self.scans and (self.forecast is None or not self.forecast.settings)
+
+
+def with_scan_gain(criticism: Criticism, measured: ChannelGain | None) -> Criticism:
+    """Return a criticism with what its settings for the laser gain on scans held out, None where nobody knows."""
+    if measured is None:
+        return criticism
+    gain = criticism.verdict.gain or Gain(measured.log_density_per_sample)
+    whole = replace(gain, channels={**gain.channels, scan_gain.RANGE_CHANNEL: measured})
+    story = replace(criticism.story, details=(*criticism.story.details, _sentence(measured)))
+    return replace(criticism, verdict=replace(criticism.verdict, gain=whole), story=story)
+
+
+def _sentence(measured: ChannelGain) -> str:
+    density = measured.log_density_per_sample
+    text = (
+        f"On held-out scans, the laser effects found gain {density.gain:+.3g} nats per reading "
+        f"(90 % {density.lo90:+.3g} to {density.hi90:+.3g})"
+    )
+    if measured.rmse is not None:
+        before, after = 1e3 * measured.rmse.baseline, 1e3 * measured.rmse.extended
+        text += f"; rms error {before:.2g} mm before, {after:.2g} mm after"
+    return text + ("." if density.lo90 > 0 else ": not confirmed.")
+
+
+def with_slam(criticism: Criticism, recording: Recording, extension: Extension) -> Criticism:
+    """Return a criticism with what SLAM gains by the extension, or why that is not known."""
+    verdict, story = criticism.verdict, criticism.story
+    if extension.empty or verdict.gain is None:
+        return criticism
+    seen = measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
+    told = replace(story, details=(*story.details, seen.sentence))
+    if seen.gain is None or seen.picture is None:
+        return replace(criticism, story=told)
+    whole = replace(verdict, gain=replace(verdict.gain, slam=seen.gain))
+    return replace(criticism, verdict=whole, story=replace(told, overlays=(seen.picture, *story.overlays)))
+
+
+def _without(name: str, criticism: Criticism, recording: Recording, extension: Extension) -> Settings:
+    """Return what extends the model as fitted without a run."""
+    base, scans = extension.refit(name), extension.scans
+    others = replace(recording, train=tuple(other for other in recording.train if other != name))
+    if scans and name not in recording.test and others.train and why_not_usable(others) is None:
+        places = ScanPoses(others, criticism.model, extension.forecast)
+        scans = scan_gain.refit(joined([shots for _, shots in places.trained_runs()]), scans)
+    return (*base, *scans)

@@ -48,12 +48,9 @@ def with_limits(criticism: Criticism, recording: Recording) -> Criticism:
 
 def beyond_imu(shares: dict[str, float]) -> dict[str, float]:
     """Return by which share each effect turns the robot, by its id; EXPLAINED where that may be the scale of a gyro."""
-    return {name: EXPLAINED if _like_scale(name) and share < _SCALE else share for name, share in shares.items()}
-
-
-def _like_scale(name: str) -> bool:
-    effect = effects.by_id(name)
-    return effect in effects.BASE and effect.follows is effects.Follows.W and effect.shows_in is effects.Rate.W
+    follows = [each for each in effects.BASE if each.follows is effects.Follows.W]
+    like_scale = {each.id for each in follows if each.shows_in is effects.Rate.W}
+    return {name: EXPLAINED if name in like_scale and share < _SCALE else share for name, share in shares.items()}
 
 
 def _seen(setting: EffectSetting) -> EffectSetting:

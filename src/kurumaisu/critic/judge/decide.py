@@ -3,24 +3,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.base.sensitivity import all_free_columns
+from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
+from kurumaisu.critic.engine.least_squares import covariance
 from kurumaisu.critic.heldout import drive_gain
 from kurumaisu.critic.noise import base_noise
-from kurumaisu.critic.predict import parameter_doubt
 from kurumaisu.critic.search import search
 from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import joint_fit
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
-from kurumaisu.critic.values.prior import odds
-from kurumaisu.critic.values.progress import Progress
+from kurumaisu.critic.values.criticism import Progress, Settings
+from kurumaisu.critic.values.policy import odds
+from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
 _HINT = -3.0  # [nat] from which all is judged with the noise about a curve, too
@@ -29,6 +32,7 @@ _LOOKS = 1  # rounds of that search: what it finds is judged by another one
 _LEAST = 3.0  # [nat] by which that must be likelier
 _ANEW = 2  # times that all is judged anew, because other effects act than those about which the noise was taken
 Truth = tuple[float, float] | None
+_SLIGHT = 1e-3  # share of the largest direction's whitened size below which one does not count
 
 
 @dataclass(frozen=True)
@@ -65,9 +69,7 @@ class Decision:
             )
         other = self.problem.changed(drives=drives)
         fit = other.fit_candidates(best.candidates, best.start)
-        return drive_gain.FittedExtension(
-            fit.settings, parameter_doubt.doubt(other, fit.settings, parameter_doubt.about_fit(other, fit))
-        )
+        return drive_gain.FittedExtension(fit.settings, doubt(other, fit.settings, about_fit(other, fit)))
 
 
 @dataclass(frozen=True)
@@ -211,3 +213,50 @@ def noise_residuals(
         for own, drive, left in zip(free, problem.drives, residuals, strict=True)
     ]
     return base_noise.NoiseResiduals(problem.drives, residuals, projected, truth)
+
+
+def about_fit(problem: Problem, fit: Fit) -> tuple[Settings, ...]:
+    """Return settings that differ from a fit to the problem's drives by one standard deviation each."""
+    free = [i for i, term in enumerate(fit.terms) if not term.fixed]
+    if not free:
+        return ()
+    slopes = problem.linearised(fit.terms, fit.values, [fit.terms[i] for i in free])[1]
+    tight = np.array([fit.terms[i].step if fit.terms[i].shape else 0.0 for i in free])
+    unit = np.array([fit.terms[i].step * fit.terms[i].parameter.scale for i in free])
+    root = np.linalg.cholesky(covariance(slopes.T @ slopes + np.diag(tight**2)))
+    lower = np.array([term.parameter.lower for term in fit.terms])
+    upper = np.array([term.parameter.upper for term in fit.terms])
+    others = []
+    for direction in root.T:
+        moved = fit.values.copy()
+        moved[free] += unit * direction
+        inside = np.clip(moved, lower, upper)
+        others.append(replay.completed(problem.model, settings_of(fit.terms, inside)))
+    return tuple(others)
+
+
+def about_curve(extension: FitWithCurve) -> tuple[Settings, ...]:
+    """Return settings that differ from an extension's by one standard deviation of its curve each."""
+    values, vectors = np.linalg.eigh(extension.covariance)
+    sizes = np.sqrt(np.maximum(values, 0.0))
+    basis = extension.curve.basis
+    return tuple(
+        (
+            *extension.fit.settings,
+            EffectSetting(extension.curve.id, basis.parameters(extension.coefficients + size * vector)),
+        )
+        for size, vector in zip(sizes, vectors.T, strict=True)
+        if size > _SLIGHT * sizes.max()
+    )
+
+
+def doubt(problem: Problem, settings: Settings, others: Sequence[Settings]) -> Callable[[Drive], FloatArray] | None:
+    """Return the change of a drive's increments (3 m, k) from settings to each other ones; None without any."""
+    if not others:
+        return None
+
+    def columns(drive: Drive) -> FloatArray:
+        here = problem.simulated(drive, settings)
+        return np.column_stack([(problem.simulated(drive, other) - here).ravel() for other in others])
+
+    return columns

@@ -5,44 +5,46 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import scipy
+import yaml
 
+from kurumaisu import effects
+from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.experiment.proposal import Proposal
+from kurumaisu.critic.experiment.design import Proposal
 from kurumaisu.critic.heldout.materiality import NO_NOISE, holds, matters, share_of_noise, share_of_way
 from kurumaisu.critic.imu.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.extended_model import process_noise
-from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.judge.misfit import overlays
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.story import Misfit, NoiseParameter, Story
+from kurumaisu.critic.values.story import NoiseParameter, Story
 from kurumaisu.critic.values.verdict import Cause, Estimate, Gain, Kind, Verdict
 from kurumaisu.critic.values.version import version
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import EffectSetting, Model, read_model
+from kurumaisu.settings import Section, parsed
 
 # At usual rates, from which growing noise is named: alone, where less is no matter, and beside something else, which in
 # another form than ours leaves residuals that grow with the rates, too.
 _GROWTH_ALONE, _GROWTH_BESIDE = 0.2, 0.4
+_WIDE = {"min": -100.0, "max": 100.0, "resolution": 0.0}  # [V]
 
 
 def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Criticism:
     """Return the criticism of data that must be mended before anything is fitted."""
     notes = tuple(note for note in recording.problems if note not in problems)
     verdict = Verdict("invalid_data", problems=(*problems, *notes))
-    story = Story(
-        recording=recording.name,
-        model=model.name,
+    story = replace(
+        _story(recording, model),
         headline=sentences.wrong_data(problems),
         details=tuple(problems),
-        pose_source=_pose_source(recording),
-        provenance=_provenance(recording),
         overlays=overlays(recording, model),
     )
     return Criticism(verdict, story, model, ())
@@ -50,13 +52,10 @@ def invalid(recording: Recording, model: Model, problems: Sequence[str]) -> Crit
 
 def undriven(recording: Recording, model: Model) -> Criticism:
     """Return the criticism of drives of which nobody knows what drove them: nothing is said of the base."""
-    story = Story(
-        recording=recording.name,
-        model=model.name,
+    story = replace(
+        _story(recording, model),
         headline="These scans show no effect that the model lacks.",
         details=("base not criticised: no voltages, commands or odometry were recorded.",),
-        pose_source=_pose_source(recording),
-        provenance=_provenance(recording),
     )
     return Criticism(Verdict("none", problems=recording.problems), story, model, ())
 
@@ -75,7 +74,9 @@ def criticism(
     fitted = {name: intervals.estimates(problem, found.best, name) for name in sorted(found.best.ids)}
     causes = tuple(_cause(problem, found, name, fitted[name]) for name in found.named if name in matters)
     growth = _growing_noise(made, drives)
-    kind = _kind(found, matters) if growth is None else "named"
+    kind: Kind = "confounded" if found.confounded and matters else "none"
+    if growth is not None or matters & set(found.named):
+        kind = "named"
     settings = found.best.settings if kind in ("named", "confounded") else ()
     verdict = Verdict(
         kind,
@@ -85,16 +86,15 @@ def criticism(
         next_experiment=proposal.experiment,
         gain=gain,
     )
+    # Where the best set is empty, the effect that comes nearest, if any.
+    shown = found.best if found.best.ids else next((fit for fit in found.fits if fit.ids), found.best)
     details = sentences.details(problem, found, drives, fitted, shares, matters)
-    story = Story(
-        recording=recording.name,
-        model=problem.model.name,
+    story = replace(
+        _story(recording, problem.model),
         headline=sentences.headline(verdict, found, matters, shares),
         details=(*details, *((sentences.UNTESTED,) if matters and not held else ())),
-        pose_source=_pose_source(recording),
-        provenance=_provenance(recording),
         overlays=overlays(recording, problem.model, settings or None),
-        misfits=_misfits(problem, found),
+        misfits=misfit.figures(problem, shown.settings, sorted(shown.ids)),
         rivals=sentences.rivals(found),
         noise=_noise(problem),
         unexplained=(*sentences.suspects(found), *misfit.remaining(problem, found.best)),
@@ -164,12 +164,6 @@ def _open(found: SearchResult) -> tuple[str, ...]:
     return tuple(sorted(best if len(best) > 1 or rival is None else best | {rival}))
 
 
-def _kind(found: SearchResult, matters: set[str]) -> Kind:
-    if not matters:
-        return "none"
-    return "named" if matters & set(found.named) else "confounded" if found.confounded else "none"
-
-
 def _cause(problem: Problem, found: SearchResult, name: str, parameters: dict[str, Estimate]) -> Cause:
     rest = {candidate for candidate in found.best.candidates if candidate.id != name}
     without = problem.fit_candidates(rest, found.best.start)
@@ -202,20 +196,62 @@ def _noise(problem: Problem) -> tuple[NoiseParameter, ...]:
     return tuple(NoiseParameter(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
 
 
-def _misfits(problem: Problem, found: SearchResult) -> tuple[Misfit, ...]:
-    """Return a figure per effect of the best set; where that is empty, of the effect that comes nearest, if any."""
-    fit = found.best if found.best.ids else next((fit for fit in found.fits if fit.ids), found.best)
-    return misfit.figures(problem, fit.settings, sorted(fit.ids))
-
-
-def _pose_source(recording: Recording) -> str:
-    return "; ".join(dict.fromkeys(run.pose_source for run in recording.runs))
-
-
-def _provenance(recording: Recording) -> dict[str, str]:
-    return {
+def _story(recording: Recording, model: Model) -> Story:
+    """Return what is told of a recording, whatever is found."""
+    provenance = {
         "runs fitted": ", ".join(recording.train),
         "runs held out": ", ".join(recording.test) or "each in turn",
         "least probability of a named cause": f"{NAMED:g}",
         "kurumaisu, numpy, scipy": f"{version()}, {np.__version__}, {scipy.__version__}",
+    }
+    source = "; ".join(dict.fromkeys(run.pose_source for run in recording.runs))
+    return Story(recording.name, model.name, "", (), source, provenance)
+
+
+def process_noise(problem: Problem) -> EffectSetting:
+    """Return the estimated noise of the rates as the effect that the simulator draws it from.
+
+    That effect has one colour: both are taken into its size, as they were on average.
+    """
+    (random,) = (effect for effect in effects.BASE if effect.random)
+    noise = problem.noise
+    sd_v, sd_w = np.hypot([noise.sd_v, noise.sd_w], [noise.slow_v, noise.slow_w])
+    share = noise.slow_w**2 / (noise.slow_w**2 + noise.sd_w**2)  # of the variance of the yaw rate
+    tau = (1 - share) * noise.tau + share * noise.slow_tau  # keeps how far the heading wanders
+    values = {"sd_v": float(sd_v), "sd_w": float(sd_w), "tau": tau, "growth": noise.growth}
+    return EffectSetting(random.id, {p.name: min(values[p.name], p.upper) for p in random.parameters})
+
+
+def extended_text(original: Path, model: Model, settings: Sequence[EffectSetting], recording: str) -> str:
+    """Return the model file `original` with these effects in place of its own of the same id; it can be loaded.
+
+    model: as criticised; where its voltages are the commands themselves, the file gets that law.
+    Raise Error when the file cannot be read, or the text is no model.
+    """
+    content = parsed(read_text(original, MOST_TEXT), str(original))
+    given = {setting.id for setting in settings}
+    content["effects"] = [own for own in content["effects"] if own["id"] not in given]
+    content["effects"] += [{"id": s.id, "parameters": dict(s.parameters)} for s in settings]
+    if model.law_name not in content["voltage_laws"]:
+        content["name"] = model.name
+        content["voltage_law"] = model.law_name
+        content["voltage_laws"][model.law_name] = {
+            "translation": _axis(model.translation),
+            "steering": _axis(model.steering),
+        }
+        # The bands are in the volts of the file's own law.
+        content["voltages"] |= {"translation": dict(_WIDE), "steering": dict(_WIDE)}
+    if not model.robot.voltages:
+        content["robot"] = model.robot.said
+        content["chassis"]["track"] = model.chassis.track
+    text = yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+    where = f"{original} with what was found"
+    read_model(Section(parsed(text, where), where))
+    return f"# {original.name} and what the critic found in {' '.join(recording.split())}.\n{text}"
+
+
+def _axis(law: object) -> dict[str, dict[str, float]]:
+    return {
+        side: {"slope": getattr(law, side).slope, "intercept": getattr(law, side).intercept}
+        for side in ("positive", "negative")
     }

@@ -12,7 +12,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.experiment.proposal import Proposal
+from kurumaisu.critic.experiment.design import Proposal
 from kurumaisu.critic.heldout.materiality import (
     HORIZON,
     MATERIAL,
@@ -26,16 +26,14 @@ from kurumaisu.critic.heldout.materiality import (
 )
 from kurumaisu.critic.judge import explain
 from kurumaisu.critic.judge.decide import Decision
-from kurumaisu.critic.judge.extended_model import process_noise
-from kurumaisu.critic.judge.misfit import moments
-from kurumaisu.critic.judge.overlays import overlays
+from kurumaisu.critic.judge.explain import process_noise
+from kurumaisu.critic.judge.misfit import moments, overlays
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences, shapes
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve, fit_with_curve
-from kurumaisu.critic.values.binned_means import bins
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.values.story import Alternative, Misfit
+from kurumaisu.critic.values.story import Alternative, Misfit, bins
 from kurumaisu.critic.values.verdict import NORMAL90, Gain, Unknown
 from kurumaisu.types import BoolArray, FloatArray
 
@@ -222,12 +220,7 @@ def _unknowns(problem: Problem, found: SearchResult) -> Iterator[Unknown]:
     p = found.p_curves
     seen: set[str] = set()
     for rival in found.curves:
-        if (
-            rival.form_of
-            or rival.curve.id in seen
-            or len(seen) == _LISTED
-            or (seen and p[rival.curve.id] < _PLAUSIBLE)
-        ):
+        if rival.form_of or rival.curve.id in seen or len(seen) == _LISTED or (seen and p[rival.curve.id] < _PLAUSIBLE):
             continue
         seen.add(rival.curve.id)
         own = fit_with_curve(problem, rival.fit, rival.curve, rival.evidence.prior)

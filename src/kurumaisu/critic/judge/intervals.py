@@ -61,21 +61,16 @@ def _doubt(problem: Problem, fit: Fit, columns: FloatArray) -> FloatArray:
     Nobody can refuse a form that differs by FORM_ERROR of the signal; what it does is like the signal, and is taken for
     other sizes of what does the like.
     """
-    out = np.zeros(columns.shape[1])
+    out, here = np.zeros(columns.shape[1]), problem.residual(fit.terms, fit.values)
     for name in sorted(fit.ids):
         if effects.by_id(name).empirical:
-            signal = _signal(problem, fit, name)
+            terms = zip(fit.terms, fit.values, strict=True)
+            null = np.array([term.null if term.id == name and not term.shape else value for term, value in terms])
+            signal = problem.residual(fit.terms, null) - here  # what the effect does, whitened
             norms = np.linalg.norm(columns, axis=0) * np.linalg.norm(signal)
             power = FORM_ERROR**2 * float(signal @ signal)
             out += power / FORM_WAYS * (columns.T @ signal / np.maximum(norms, 1e-12)) ** 2
     return np.asarray(np.sqrt(out))
-
-
-def _signal(problem: Problem, fit: Fit, name: str) -> FloatArray:
-    """Return what an effect of a fit does, whitened."""
-    terms = zip(fit.terms, fit.values, strict=True)
-    null = np.array([term.null if term.id == name and not term.shape else value for term, value in terms])
-    return problem.residual(fit.terms, null) - problem.residual(fit.terms, fit.values)
 
 
 def _next_order(problem: Problem, fit: Fit, name: str) -> float:
@@ -93,7 +88,8 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
         paths = [replay.path(drive, problem.model, some) for some in (fit.settings, without)]
         one, other = (geometry.between(path[starts], path[stops]) for path in paths)
         d = _amounts(one - other)
-        m = np.minimum(*(way[stops] - way[starts] for way in map(_travelled, paths)))
+        travelled = [np.cumsum(_amounts(np.diff(path, axis=0, prepend=path[:1])), axis=0) for path in paths]
+        m = np.minimum(*(way[stops] - way[starts] for way in travelled))
         changed, along, made = changed + (d**2).sum(axis=0), along + (d * m).sum(axis=0), made + (m**2).sum(axis=0)
     where = int(np.argmax(changed / np.maximum(made, 1e-12)))
     return float(min(changed[where] / max(along[where], 1e-12), 1.0) / np.sqrt(3))
@@ -102,11 +98,6 @@ def _next_order(problem: Problem, fit: Fit, name: str) -> float:
 def _amounts(moves: FloatArray) -> FloatArray:
     """Return how far (n, 3) moves go and turn, (n, 2)."""
     return np.asarray(np.abs(np.column_stack([moves[:, 0] + 1j * moves[:, 1], moves[:, 2]])))
-
-
-def _travelled(path: FloatArray) -> FloatArray:
-    """Return how far a chair has gone and turned at each pose (n, 3) of its path, to and fro, (n, 2)."""
-    return np.vstack([np.zeros((1, 2)), np.cumsum(_amounts(np.diff(path, axis=0)), axis=0)])
 
 
 def ends_of(problem: Problem, fit: Fit, at: int, ridge: FloatArray, sd: float) -> tuple[float, float]:
@@ -128,7 +119,9 @@ def ends_of(problem: Problem, fit: Fit, at: int, ridge: FloatArray, sd: float) -
     cost = fallen(0.0)
     ends = []
     for sign, room in ((-1.0, value - parameter.lower), (1.0, parameter.upper - value)):
-        far = _step_end(fallen, sign, abs(value)) if fit.terms[at].rough else 0.0
+        # Of a step, the farthest place where the likelihood stands as high as at the ends of 90 %.
+        shares = _PEAK_DISTANCES if fit.terms[at].rough else ()
+        far = max((each * abs(value) for each in shares if fallen(sign * each * abs(value)) < _REFUSED), default=0.0)
         ends.append(value + sign * max(_end(fallen, sign, sd, room), min(far, room)))
     return ends[0], ends[1]
 
@@ -149,12 +142,6 @@ def _end(fallen: Callable[[float], float], sign: float, sd: float, room: float) 
             share = (NORMAL90 - inside[1]) / (outside[1] - inside[1])
             offset = inside[0] + float(np.clip(share, 0.2, 0.8)) * (outside[0] - inside[0])
     return offset
-
-
-def _step_end(fallen: Callable[[float], float], sign: float, size: float) -> float:
-    """Return the farthest place to one side where the likelihood stands as high as at the ends of 90 %."""
-    likely = [share * size for share in _PEAK_DISTANCES if fallen(sign * share * size) < _REFUSED]
-    return max(likely, default=0.0)
 
 
 def _estimate(model: Model, term: Term, value: float, low: float, high: float) -> Estimate:

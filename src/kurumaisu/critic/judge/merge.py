@@ -8,13 +8,11 @@ from dataclasses import replace
 from operator import itemgetter
 
 from kurumaisu import effects
-from kurumaisu.critic.experiment.proposal import LISTED_IDS
+from kurumaisu.critic.experiment.design import LISTED_IDS
 from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
-from kurumaisu.critic.values.criticism import Criticism
-from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
-from kurumaisu.critic.values.settings import Settings
-from kurumaisu.critic.values.verdict import ChannelGain, Kind, Unknown, Verdict
+from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Pictures, Settings
+from kurumaisu.critic.values.verdict import ChannelGain, Kind, Verdict
 
 _NOTHING_SAID = "none"
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
@@ -35,7 +33,8 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
     criticism = _with_drive(criticism, finding)
     verdict, story = criticism.verdict, criticism.story
     if finding.refused is not None:
-        told = replace(story, details=(*story.details, _refusal(finding.refused), *finding.details))
+        refusal = f"laser not criticised: {finding.refused}."
+        told = replace(story, details=(*story.details, refusal, *finding.details))
         if not story.noise and verdict.verdict == _NOTHING_SAID:  # nothing was said of the base either
             told = replace(told, headline=f"No effect can be named: {finding.refused}.")
         return replace(criticism, story=told)
@@ -46,12 +45,13 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
         kind = "named"
     elif finding.confounded and kind == _NOTHING_SAID:
         kind = "confounded"
+    drawn = {(one.channel, one.covariate) for one in verdict.unknown}  # errors of the reference that drives tell, too
     joined = replace(
         verdict,
         verdict=kind,
         causes=(*verdict.causes, *finding.causes),
         confounded=(*verdict.confounded, *finding.confounded),
-        unknown=(*verdict.unknown, *(one for one in finding.unknown if not _told(one, verdict))),
+        unknown=(*verdict.unknown, *(one for one in finding.unknown if (one.channel, one.covariate) not in drawn)),
     )
     words = headline(finding)
     if words and verdict.verdict in ("named", "confounded", "unknown"):
@@ -71,11 +71,6 @@ def with_scans(criticism: Criticism, finding: LaserFinding) -> Criticism:
         noise=(*story.noise, *shown.noise),
     )
     return replace(criticism, verdict=joined, story=told, settings=(*criticism.settings, *finding.settings))
-
-
-def _told(one: Unknown, verdict: Verdict) -> bool:
-    """Tell whether the drives tell of an error of the reference over the same."""
-    return any((one.channel, one.covariate) == (other.channel, other.covariate) for other in verdict.unknown)
 
 
 def confirmed_scans(
@@ -193,7 +188,3 @@ def headline(finding: LaserFinding) -> str:
     if finding.confounded:
         return f"The model lacks an effect, but these scans cannot tell which: {' or '.join(finding.confounded[0])}."
     return ""
-
-
-def _refusal(why: str) -> str:
-    return f"laser not criticised: {why}."

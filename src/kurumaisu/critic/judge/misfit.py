@@ -1,21 +1,26 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Residuals drawn over what an effect follows, and what is left when it is in."""
+"""Pictures: runs from above; residuals over what an effect follows, and what is left when it is in."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.covariates import with_covariates
+from kurumaisu.critic.base.drive import GRID, Drive, prepare
+from kurumaisu.critic.base.replay import PICTURE, RESTART, restarted_path
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained
-from kurumaisu.critic.values.story import Misfit, Moments
+from kurumaisu.critic.values.recording import Recording, Run
+from kurumaisu.critic.values.story import FOLLOWED, Misfit, Moments, Overlay, bins, explained
 from kurumaisu.effects import Follows, Rate
+from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap
-from kurumaisu.params import EffectSetting
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _CHANGE = 0.5  # [s] over which a change of the input is taken
@@ -25,6 +30,8 @@ _NOTEWORTHY = 4.0  # standard errors from which a remaining correlation is said
 # Increments as rates, in the order of their columns, with their units.
 RATE_CHANNELS = {"v": ("forward speed", "m/s"), "lateral": ("sideways speed", "m/s"), "w": ("yaw rate", "rad/s")}
 _UNITS = {Follows.V: "m/s", Follows.W: "rad/s"}
+
+
 _UNITS |= {Follows.V_CHANGE: f"m/s in {_CHANGE:g} s", Follows.W_CHANGE: f"rad/s in {_CHANGE:g} s"}
 
 
@@ -69,7 +76,8 @@ def remaining(problem: Problem, fit: Fit) -> tuple[str, ...]:
     for channel, rate in ((0, Rate.V), (2, Rate.W)):
         for follows in Follows:
             x = np.concatenate([covariate(drive, follows) for drive in problem.drives])
-            r = _correlation(white[:, channel], x)
+            left = white[:, channel]
+            r = float(np.corrcoef(left, x)[0, 1]) if left.std() and x.std() else 0.0
             if abs(r) * np.sqrt(len(x)) > _NOTEWORTHY:
                 said.append(f"The residual {rate.value} still follows the {follows.value} (correlation {r:+.2f}).")
     return tuple(said) or ("The residual follows neither the commanded rates nor their changes.",)
@@ -77,7 +85,10 @@ def remaining(problem: Problem, fit: Fit) -> tuple[str, ...]:
 
 def _figure(problem: Problem, settings: Sequence[EffectSetting], effect: type[effects.BaseEffect]) -> Misfit:
     others = tuple(setting for setting in settings if setting.id != effect.id)
-    samples = [_samples(problem, drive, settings, others) for drive in problem.drives]
+    samples = []  # residual without the effect and what it adds, as rates (m, 3)
+    for drive in problem.drives:
+        dt, without = np.diff(drive.times)[:, np.newaxis], problem.simulated(drive, others)
+        samples.append(((drive.measured - without) / dt, (problem.simulated(drive, settings) - without) / dt))
     residual, added = (np.concatenate(parts) for parts in zip(*samples, strict=True))
     # The channel in which the effect stands out most from what is left when it is in.
     left = residual - added
@@ -112,15 +123,6 @@ def moments(drives: Sequence[Drive]) -> Moments:
     )
 
 
-def _samples(
-    problem: Problem, drive: Drive, settings: Sequence[EffectSetting], others: Sequence[EffectSetting]
-) -> tuple[FloatArray, FloatArray]:
-    """Return residual without an effect and what it adds, as rates (m, 3)."""
-    dt = np.diff(drive.times)[:, np.newaxis]
-    without = problem.simulated(drive, others)
-    return (drive.measured - without) / dt, (problem.simulated(drive, settings) - without) / dt
-
-
 def _covariates(drives: Sequence[Drive]) -> list[Covariate]:
     """Return what an effect may be drawn over, per increment of all drives."""
     parts = {f.value: [covariate(drive, f) for drive in drives] for f in Follows}
@@ -141,7 +143,32 @@ def _followed(covariates: Sequence[Covariate], usual: str, added: FloatArray) ->
     return best if share[best.name] >= FOLLOWED else None
 
 
-def _correlation(a: FloatArray, b: FloatArray) -> float:
-    if a.std() == 0 or b.std() == 0:
-        return 0.0
-    return float(np.corrcoef(a, b)[0, 1])
+def overlays(
+    recording: Recording, model: Model, settings: Sequence[EffectSetting] | None = None
+) -> tuple[Overlay, ...]:
+    """Return a picture of every run that is whole enough for one; settings: what extends the model, if anything."""
+    drawn = []
+    for run in recording.runs:
+        with suppress(Error):
+            drawn.append(_overlay(run, model, settings, held_out=run.name in recording.test))
+    return tuple(drawn)
+
+
+def _overlay(run: Run, model: Model, settings: Sequence[EffectSetting] | None, *, held_out: bool) -> Overlay:
+    drive = with_covariates(prepare(run, model, PICTURE), run)
+    baseline, off = _restarted(drive, replay.path(drive, model, ()))
+    extended, off_extended = None, None
+    if settings is not None:
+        extended, off_extended = _restarted(drive, replay.path(drive, model, settings))
+    path = drive.poses[:, :2]
+    return Overlay(drive.name, path, baseline, extended, held_out, RESTART, off, off_extended, drive.times)
+
+
+def _restarted(drive: Drive, path: FloatArray) -> tuple[FloatArray, float | None]:
+    """Return a simulated path (n, 2) in pieces that begin at measured poses, nan between, and how far off they end."""
+    pieces, off = [], []
+    for rows, poses in restarted_path(drive, path):
+        pieces += [poses[:, :2], np.full((1, 2), np.nan)]
+        if drive.times[rows][-1] - drive.times[rows][0] > RESTART / 2:
+            off.append(np.sum((poses[-1] - drive.poses[rows][-1])[:2] ** 2))
+    return np.concatenate(pieces)[:-1], float(np.sqrt(np.mean(off))) if off else None

@@ -6,26 +6,32 @@ multipliers of the track and of each side's radius. A robot whose steady rates a
 has G_vv = (m_l + m_r) / 2, G_ww = G_vv / s and G_wv = (m_r - m_l) / (b s).
 
 They are fitted whether or not they differ from 1 enough for a cause to be named, beside what was found, if that is
-needed; of that, what leaves rates in proportion counts as theirs, too.
+needed; of that, what leaves rates in proportion counts as theirs, too. A criticism says them in words, and of which
+robot it is.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive
+from kurumaisu.critic.base.replay import robot_said
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.experiment import design
-from kurumaisu.critic.imu.turning_only import SCALE_SD
-from kurumaisu.critic.values.verdict import NORMAL90, Estimate, Multipliers
+from kurumaisu.critic.imu.turning_only import SCALE_SD, with_limits
+from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.digits import quantities, with_interval
+from kurumaisu.critic.values.recording import Recording
+from kurumaisu.critic.values.verdict import NORMAL90, Estimate, Multipliers, RobotTaken
 from kurumaisu.experiments import Phase, samples
-from kurumaisu.params import EffectSetting, Model
+from kurumaisu.params import EffectSetting, Model, Robot
 from kurumaisu.types import FloatArray
 
 _HELD = 20.0  # [s] after which rates that were asked for are steady
@@ -34,6 +40,8 @@ _SAME = 1e-3  # [m/s], [rad/s] by which steady rates may be out of proportion
 _MOST = 5.0  # a multiplier beyond is none: an axis is reversed, or in another unit
 # UMBmark (Borenstein and Feng 1996): a square of 4 m, slowly, cornering on the spot, in both directions
 _SIDE, _SPEED, _TURN, _REST = 4.0, 0.2, np.radians(40.0), 2.0
+_CHAIR = re.compile(r"\b(a|the|The) chair\b")
+_UNITY = 1.0e-3  # by which wheels must differ before either side has a multiplier of its own
 
 
 @dataclass(frozen=True)
@@ -160,3 +168,68 @@ def _drive(rates: FloatArray) -> Drive:
     """Return a drive that asks for rates (n, 2) on the grid, from (0, 0, 0)."""
     ends = np.array([0.0, GRID * len(rates)])
     return Drive("", "command", 0.0, rates[:, 0], rates[:, 1], ends, np.zeros((2, 3)))
+
+
+def with_robot(criticism: Criticism, recording: Recording) -> Criticism:
+    """Return the criticism with the robot that it is of: what was assumed, what to paste, and what to call it.
+
+    Of one that was only seen to turn, without what nobody measured.
+    """
+    robot = criticism.model.robot
+    verdict, story = criticism.verdict, criticism.story
+    found = None if verdict.robot is None else verdict.robot.multipliers
+    taken = RobotTaken(robot.kind, not robot_said(recording, criticism.model), found)
+    details = [_worded(one, robot) for one in story.details]
+    if taken.assumed and verdict.verdict != "invalid_data" and not all(run.voltage for run in recording.runs):
+        why = "nothing was asked of it that its voltages cannot say" if robot.voltages else "it was asked for more"
+        what = f"{robot.name}, as {why}" if robot.voltages else f'"{robot.name}", as {why} than an MD-100 can do'
+        details.append(f"The robot was taken for {what}; `robot:` in meta.yaml, or --robot, says which it is.")
+    if found is not None:
+        details.append(_in_words(found, robot, turning=recording.turning))
+    told = replace(
+        story,
+        headline=_worded(story.headline, robot),
+        details=tuple(details),
+        unexplained=tuple(_worded(one, robot) for one in story.unexplained),
+        provenance={**story.provenance, "robot": f"{robot.kind}{', assumed' if taken.assumed else ''}"},
+        paste=_paste(found, turning=recording.turning) if found is not None else "",
+    )
+    return with_limits(replace(criticism, verdict=replace(verdict, robot=taken), story=told), recording)
+
+
+def _worded(sentence: str, robot: Robot) -> str:
+    return _CHAIR.sub(rf"\1 {robot.noun}", sentence)
+
+
+def _in_words(found: Multipliers, robot: Robot, *, turning: bool) -> str:
+    e = found.apparent_track
+    track = f"as if its wheels were {with_interval(e.estimate, e.lo90, e.hi90, e.unit)} apart"
+    before, after = quantities([found.square_before, found.square_after], "m")
+    square = f"UMBmark's square of 4 m ends {before} from its start"
+    if found.square_after < found.square_before:
+        square += f"; with the multipliers for its controller, {after}, their uncertainty included"
+    else:
+        square += "; these drives know of no multipliers that would surely close it better"
+    skids = "skids, and " if robot.skids else ""
+    radius = ", if their radius is right, which turning alone does not tell" if turning else ""
+    return f"It {skids}turns {track}{radius}; its software has {robot.track:g} m. {square}."
+
+
+def _paste(found: Multipliers, *, turning: bool) -> str:
+    """Return lines for the controller's YAML file; nothing where they would be no better.
+
+    turning: nobody knows what the radii of both wheels are on the mean.
+    """
+    if found.square_after >= found.square_before:
+        return ""
+    rows = [("wheel_separation_multiplier", found.wheel_separation_multiplier)]
+    left, right = found.left_wheel_radius_multiplier, found.right_wheel_radius_multiplier
+    if abs(left.estimate - right.estimate) < _UNITY:
+        rows += [] if turning else [("wheel_radius_multiplier", found.wheel_radius_multiplier)]
+    else:
+        rows += [("left_wheel_radius_multiplier", left), ("right_wheel_radius_multiplier", right)]
+    lines = [f"{name}: {e.estimate:.4f}  # 90 %: {e.lo90:.4f} to {e.hi90:.4f}" for name, e in rows]
+    if len(rows) > 2 and not turning:
+        e = found.wheel_radius_multiplier
+        lines.append(f"# wheel_radius_multiplier: {e.estimate:.4f}  # instead of left and right, which it overrides")
+    return "\n".join(lines)

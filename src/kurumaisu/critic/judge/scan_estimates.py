@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""What was fitted as a model file has it, and as the causes of a verdict."""
+"""What was fitted to scans: as a model file has it, as causes of a verdict, and outside the catalogue in words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
-from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
+from kurumaisu.critic.ranges.search.block_evidence import BlockComparison, SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
+from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
+from kurumaisu.critic.unknown.bases import Basis
+from kurumaisu.critic.unknown.shapes import grid, shape_of
+from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER
 from kurumaisu.critic.values.policy import NAMED
-from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate
+from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate, Unknown
 from kurumaisu.effects import Echoes
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
@@ -25,6 +29,9 @@ _ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
 _SAME = 3.0  # sds of a constant error within which it is another form's
 _RAMP, _ALIKE = 20000, 1e-4  # readings that show what an effect does; [m] by which near and far ones may differ
 _LACKS = 0.05  # share of readings of that part, at least
+_LISTED = 3
+# All others of RANGE_COVARIATES are angles.
+_UNITS = dict.fromkeys(("range", "hit_x", "hit_y", "x", "y"), "m") | {"time": "s", "v": "m/s", "w": "rad/s"}
 
 
 def estimates_of(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
@@ -79,7 +86,9 @@ def with_scatter(
         name, mean = each.setting.id, settings.get(each.setting.id)
         if each.p >= NAMED:
             known[name] = _joined(known.get(name), each)
-        out[name] = EffectSetting(name, {**each.setting.parameters, **(_off_null(mean) if mean else {})})
+        nulls = {p.name: p.null for p in effects.by_id(name).parameters}
+        off = {} if mean is None else {key: value for key, value in mean.parameters.items() if value != nulls[key]}
+        out[name] = EffectSetting(name, {**each.setting.parameters, **off})
     return tuple(known.values()), tuple(out.values())
 
 
@@ -131,11 +140,6 @@ def _constant(values: Mapping[str, float], name: str) -> float | None:
     return float(moved.mean()) if abs(moved[0] - moved[1]) < _ALIKE else None
 
 
-def _off_null(setting: EffectSetting) -> dict[str, float]:
-    nulls = {p.name: p.null for p in effects.by_id(setting.id).parameters}
-    return {name: value for name, value in setting.parameters.items() if value != nulls[name]}
-
-
 def _joined(cause: Cause | None, scatter: ScatterEffect) -> Cause:
     parameters = {p.name: p for p in effects.by_id(scatter.setting.id).parameters}
     estimates = dict(cause.parameters) if cause is not None else {}
@@ -145,3 +149,55 @@ def _joined(cause: Cause | None, scatter: ScatterEffect) -> Cause:
         estimates[name] = Estimate(value, low, high, p.unit)
     nats = scatter.nats + (cause.gain_nats if cause is not None else 0.0)
     return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)
+
+
+@dataclass(frozen=True)
+class ReadingCurve:
+    """A curve with its coefficients (m,) and their covariance (m, m), as shapes describes it."""
+
+    basis: Basis
+    coefficients: FloatArray
+    covariance: FloatArray
+
+
+def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
+    """Yield the curve that acts, and the next ones that could stand in for it."""
+    seen: set[str] = set()
+    first = () if weighed.winner is None else (weighed.winner,)
+    for rival in (*first, *weighed.rivals):
+        basis = rival.free.basis
+        if basis is None or rival.free.id in seen or len(seen) == _LISTED:
+            continue
+        seen.add(rival.free.id)
+        p = min(weighed.p[rival.free.id], 1.0)
+        _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
+        curve = ReadingCurve(basis, 1e3 * coefficients, 1e6 * covariance)
+        channel, unit = (UNKNOWN_CHANNEL, "mm") if rival.free.pose is None else UNKNOWN_POSE[rival.free.pose]
+        yield Unknown(channel, _called(basis), shape(curve, unit), p)
+
+
+def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:
+    """Yield the curve that the noise of readings follows, and the next ones that could stand in for it."""
+    for one in curves[:_LISTED]:
+        curve = ReadingCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
+        yield Unknown(UNKNOWN_SCATTER, _called(one.basis), f"of the noise: {shape(curve, '%')}", one.p)
+
+
+def _called(basis: Basis) -> str:
+    """Return what a reader calls a covariate: a column as the recording calls it."""
+    return basis.covariate.replace("_", " ") if basis.covariate in effects.RANGE_COVARIATES else basis.covariate
+
+
+def shape(curve: ReadingCurve, of: str) -> str:
+    """Return a curve's shape with place and size, each with its 90 % interval; of: its unit."""
+    found, at = shape_of(curve), grid(curve)
+    basis = curve.basis
+    unit = _UNITS.get(basis.covariate, "rad" if basis.covariate in effects.RANGE_COVARIATES else "")
+    size, low, high = np.abs(found.size) if found.kind == "line" else found.size
+    told = f"{size:.3g} {of} (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
+    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
+    if found.kind == "line":
+        return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} {span}"
+    if found.kind == "irregular":
+        return f"irregular, within {told} {span}"
+    return f"{found.kind} of {told} at {found.place[0]:.3g} {unit}".rstrip()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Which scripted experiment supplies what scans lack: planned in its own world, with the effects' usual sizes."""
+"""What scans lack to tell effects apart, and which scripted experiment supplies it: planned in its own world."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from kurumaisu import effects
-from kurumaisu.critic.experiment.proposal import DECIDED
+from kurumaisu.critic.experiment.design import DECIDED
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of, predict
 from kurumaisu.critic.ranges.scans.gathering import gather
@@ -31,6 +31,9 @@ _REST = 5.0  # [s] of standing there before the first scan and after the last on
 _LONGEST = 600.0  # [s] of an experiment that is proposed before anything is known
 _TRUTH = (0.005, 0.005)  # [m, rad] of a reference as surveyed marks give it, where a recording does not say
 _COMMON = (2e-4, 1.0)  # [m, s] of whole scans
+_FLAT = 0.02  # [m] what the ends of beams on one wall scatter by across it
+_MOVED = 0.05  # [m] between the places of a laser, at least
+_DISTANCES = 1.2  # ratio of the farthest to the nearest reading, at least
 
 
 def supplying_experiment(
@@ -105,3 +108,28 @@ def _unexplained(gram: FloatArray, at: int, forms: Sequence[Form]) -> float:
         inner, outer = gram[form.span, form.span], gram[form.span, at]
         rest.append(whole - float(outer @ np.linalg.lstsq(inner, outer, rcond=1e-9)[0]))
     return 0.5 * max(min(rest), 0.0)
+
+
+def shortcomings(assembly: Assembly) -> list[str]:
+    """Return sentences about what the scans did not see, with the scripted drive that shows it."""
+    seen, trust = assembly.marks.seen, assembly.geometry
+    if not trust.any():
+        return ["laser: no beam hits a mapped wall away from its ends; record room_poses in a mapped room."]
+    bearings = np.array([each.bearings for each in seen.beams])
+    angle = seen.origins[..., 2] + bearings
+    reach = np.where(trust, seen.level, 0.0)[..., np.newaxis]
+    ends = seen.origins[..., :2] + reach * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    out = []
+    centred = ends[trust] - ends[trust].mean(axis=0)
+    # The rms distance of the ends from the line through them.
+    if np.sqrt(max(np.linalg.eigvalsh(centred.T @ centred / len(centred))[0], 0.0)) < _FLAT:
+        out.append(
+            "laser: only one wall was seen, so that range offset, mounting and position of the wall cannot be told "
+            "apart; record room_poses, which sees more walls."
+        )
+    if np.ptp(seen.origins[..., :2].reshape(-1, 2), axis=0).max() < _MOVED:
+        out.append("laser: all scans are from one place; record room_poses or wall_five_distances.")
+    ranges = seen.ranges[trust]
+    if float(np.quantile(ranges, 0.98)) < _DISTANCES * float(np.quantile(ranges, 0.02)):
+        out.append("laser: all walls are equally far, so effects of the range do not show; drive wall_five_distances.")
+    return out

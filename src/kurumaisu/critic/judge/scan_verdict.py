@@ -10,12 +10,18 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.base.replay import extend
-from kurumaisu.critic.judge.clock_drift import without_double_delay
-from kurumaisu.critic.judge.scan_estimates import another_map, estimates_of, of_block, with_scatter, with_shifting_forms
-from kurumaisu.critic.judge.scan_experiment import every_id, supplying_experiment
-from kurumaisu.critic.judge.scan_shortcomings import shortcomings
+from kurumaisu.critic.judge.reference_faults import without_double_delay
+from kurumaisu.critic.judge.scan_estimates import (
+    another_map,
+    estimates_of,
+    of_block,
+    unknown_scatter,
+    unknowns,
+    with_scatter,
+    with_shifting_forms,
+)
+from kurumaisu.critic.judge.scan_experiment import every_id, shortcomings, supplying_experiment
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
-from kurumaisu.critic.judge.unknown_readings import unknown_scatter, unknowns
 from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN
 from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
@@ -37,9 +43,8 @@ from kurumaisu.critic.ranges.search.misfits import alternatives, misfits, noise_
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
 from kurumaisu.critic.scatter.common_offset import own_sd
-from kurumaisu.critic.values.laser_finding import LaserFinding, Pictures
+from kurumaisu.critic.values.criticism import LaserFinding, Pictures, Progress
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
-from kurumaisu.critic.values.progress import Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import Cause, NextExperiment
 from kurumaisu.params import EffectSetting, Model
@@ -95,7 +100,8 @@ def criticise_scans(
     progress("laser: fitting the effects found")
     fit = refitted(assembly, normal, made, recording.truth)
     if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
-        return _lead_first(question, assembly, normal, made, lead)
+        evidence = (min(made.found.p[lead[0].id], 1.0), gain_of(made, lead[0].id))
+        return _with_rest(assembly, normal, lead, evidence, question.beside(lead[0]))
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     if recording.truth is not None:
         beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms)
@@ -155,19 +161,6 @@ def _certain_lead(
     if lead is None or made.found.p[lead.id] < NAMED or any(own.id == lead.id for own in model.effects):
         return None
     return next(each for each in fit.settings if each[0] is lead)
-
-
-def _lead_first(
-    question: _Question,
-    assembly: Assembly,
-    normal: NormalEquations,
-    made: MeanEffects,
-    lead: tuple[EffectSetting, dict[str, float]],
-) -> LaserFinding:
-    """Return the finding with that effect, and the rest as it is seen beside it."""
-    name = lead[0].id
-    evidence = (min(made.found.p[name], 1.0), gain_of(made, name))
-    return _with_rest(assembly, normal, lead, evidence, question.beside(lead[0]))
 
 
 def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:

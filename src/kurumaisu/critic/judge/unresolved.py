@@ -24,11 +24,10 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.intermittent import Intermittent, intermittent
-from kurumaisu.critic.values.binned_means import bins
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.digits import moment
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
-from kurumaisu.critic.values.story import Misfit
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS
+from kurumaisu.critic.values.story import Misfit, bins
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
@@ -176,21 +175,17 @@ def _whatever_noise(found: SearchResult) -> float:
 
 def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
     """Return how many times the noise's variance the model criticised leaves of drives, at least; 0 of none."""
-    blocks = [block for drive in drives for block in _squares(problem, drive)]
+    blocks: list[FloatArray] = []
+    for drive in drives:
+        left = (drive.measured - problem.simulated(drive, ())).reshape(-1, 1)
+        white = problem.whitened(drive, left).reshape(-1, 3)
+        blocks += [(block**2).ravel() for block in drive_gain.blocks(drive, white)]
     if len(blocks) < 2:
         return 0.0
     sums = np.array([[block.sum(), len(block)] for block in blocks])
     rng = np.random.default_rng(0)
     drawn = rng.multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=_DRAWS) @ sums
     return float(np.quantile(drawn[:, 0] / drawn[:, 1], 1 - _SURE))
-
-
-def _squares(problem: Problem, drive: Drive) -> list[FloatArray]:
-    """Return the squares of what is left of a drive, whitened, in blocks of some seconds."""
-    left = (drive.measured - problem.simulated(drive, ())).reshape(-1, 1)
-    white = problem.whitened(drive, left).reshape(-1, 3)
-    index = ((drive.times[1:] - drive.times[0]) // drive_gain.BLOCK).astype(int)
-    return [(white[index == i] ** 2).ravel() for i in np.unique(index)]
 
 
 def _amber(criticism: Criticism, shape: str, words: str) -> Criticism:

@@ -17,7 +17,7 @@ from scipy.special import expit
 
 from kurumaisu._core import Whitener
 from kurumaisu.critic.base.drive import Drive
-from kurumaisu.critic.values.prior import occam
+from kurumaisu.critic.values.policy import occam
 from kurumaisu.types import FloatArray
 
 _STEP = 0.01  # of a difference

@@ -8,17 +8,18 @@ of the rates is doing at t0 is known in the same way, and goes on for some time 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.base.drive import POSE_INTERVAL, Drive
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, POSE_INTERVAL, Drive
 from kurumaisu.critic.noise.base_noise import Noise, whitened
-from kurumaisu.critic.values.settings import Settings
-from kurumaisu.params import Model
+from kurumaisu.critic.values.criticism import Settings
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
 _SAME = 1e-6  # [s] within which a stamp is meant
@@ -27,6 +28,9 @@ _LEAST_MEMORY = 5.0  # [s]
 _MOST_ROWS = 400  # that are looked back on
 _STEP = 0.25  # [s] into which the way ahead is cut: a rate's error acts along its mean heading
 _MOST_STEPS = 40
+_PLACE = ("x", "y", "heading")  # that a drive knows of itself, from its poses
+_PASSES = 2  # of a path that depends on where it leads
+_NOTHING = 1e-9  # [m], [rad]
 
 
 @dataclass(frozen=True)
@@ -121,7 +125,8 @@ def _conditional(
     first = np.zeros(rows)
     first[:known] = error.ravel()
     doubt = np.column_stack([change.ravel() for change in turned]) if turned else np.empty((rows, 0))
-    white, _ = whitened_at(drive, times, poses, np.hstack([first[:, None], doubt, np.eye(rows)[:, known:]]), noise)
+    columns = np.hstack([first[:, None], doubt, np.eye(rows)[:, known:]])
+    white, _ = whitened(drive.seen_at(times, poses), columns, noise)
     k = 1 + doubt.shape[1]
     # Each row of `white` is a unit normal: what is measured, less what the doubt makes of it.
     by = white[:known, 1:k]
@@ -132,13 +137,6 @@ def _conditional(
     inverse = np.linalg.inv(unit)
     covariance = inverse @ (np.eye(len(unit)) + swing @ spread @ swing.T) @ inverse.T
     return mean.reshape(-1, 3), np.asarray(covariance)
-
-
-def whitened_at(
-    drive: Drive, times: FloatArray, poses: FloatArray, columns: FloatArray, noise: Noise
-) -> tuple[FloatArray, FloatArray]:
-    """Return columns whitened as of a drive whose poses are others."""
-    return whitened(drive.seen_at(times, poses), columns, noise)
 
 
 def _composed(t0: float, t1: float, steps: FloatArray, covariance: FloatArray, begin: int) -> Ahead:
@@ -154,3 +152,82 @@ def _composed(t0: float, t1: float, steps: FloatArray, covariance: FloatArray, b
         rest = end - after  # swings with the turn of this step
         carried[:, 3 * i : 3 * i + 3] = [[c, -s, -rest[1]], [s, c, rest[0]], [0, 0, 1]]
     return Ahead(t0, t1, end, np.asarray(carried @ covariance @ carried.T))
+
+
+class Paths:
+    """Paths by a model and by others that it might as well be, all on the same inputs."""
+
+    def __init__(
+        self, drive: Drive, model: Model, settings: Sequence[EffectSetting], others: Sequence[Sequence[EffectSetting]]
+    ) -> None:
+        """Take others: settings that each lie one standard deviation from those given, independently."""
+        self._model, self._settings = model, settings
+        drive = drive if len(drive.poses) else drive.seen_at(np.array([drive.start]), np.zeros((1, 3)))
+        self._times = drive.start + GRID * np.arange(len(drive.v))
+        blind = _knowing(drive, {name: np.zeros(len(drive.v)) for name in _PLACE})
+        self._path = self._run(blind, settings)
+        self._others = [self._run(blind, other) for other in others]
+        turned = _knowing(drive, {name: np.ones(len(drive.v)) for name in _PLACE})
+        moved = self._run(replace(turned, poses=drive.poses + np.array([1.0, 1.0, 1.0])), settings)
+        apart = geometry.between(moved[:-1], moved[1:]) - geometry.between(self._path[:-1], self._path[1:])
+        self.placed = bool(np.abs(apart).max(initial=0.0) > _NOTHING)  # depends on where the chair is
+        if self.placed:  # the doubt is small: it may know poses that the path itself must not know
+            seen = _knowing(drive, _interpolated(drive, range(len(drive.times)), self._times))
+            self._base = self._run(seen, settings)
+            self._others = [self._run(seen, other) for other in others]
+
+    def at(
+        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
+    ) -> tuple[FloatArray, list[FloatArray]]:
+        """Return poses (n, 3) at times by the model, in a frame of its own, and as many by each other one.
+
+        past: rows of the drive's poses, none after t0, that may be used.
+        """
+        if not self.placed:
+            return self._of(self._path, times), [self._of(other, times) for other in self._others]
+        path = self._from(drive, past)
+        own, base = self._of(path, times), self._of(self._base, times)
+        # Others as they differ from the model where all poses are known, laid upon the path that knows the past alone.
+        return own, [_added(own, base, self._of(other, times)) for other in self._others]
+
+    def _from(self, drive: Drive, past: Sequence[int]) -> FloatArray:
+        """Return the path that knows where the chair was by those rows, and then goes where it leads by itself."""
+        if not len(past):
+            return self._path
+        known = _interpolated(drive, past, self._times)
+        poses = drive.poses
+        for _ in range(_PASSES):
+            path = self._run(replace(_knowing(drive, known), poses=poses), self._settings)
+            here = self._of(path, drive.times[past[-1:]])[0]
+            there = geometry.compose(drive.poses[past[-1]], geometry.between(here, path))
+            after = self._times > drive.times[past[-1]]
+            known = {name: np.where(after, there[:, i], known[name]) for i, name in enumerate(_PLACE)}
+            poses = poses + np.array([0.0, 0.0, there[0, 2] - poses[0, 2]])  # the heading that leads to the last one
+        return path
+
+    def _run(self, drive: Drive, settings: Sequence[EffectSetting]) -> FloatArray:
+        return replay.measured_poses(replace(drive, times=self._times), self._model, settings)
+
+    def _of(self, path: FloatArray, times: FloatArray) -> FloatArray:
+        return geometry.interpolate(self._times, path, times)
+
+
+def _knowing(drive: Drive, places: Mapping[str, FloatArray]) -> Drive:
+    return replace(drive, known={**drive.known, **places})
+
+
+def _interpolated(drive: Drive, rows: Sequence[int], at: FloatArray) -> dict[str, FloatArray]:
+    """Return where the chair was by some of the reference's rows, held before the first and after the last."""
+    chosen = np.asarray(rows, dtype=int)
+    if not len(chosen):
+        return {name: np.zeros(len(at)) for name in _PLACE}
+    return {name: np.interp(at, drive.times[chosen], drive.poses[chosen, i]) for i, name in enumerate(_PLACE)}
+
+
+def _added(own: FloatArray, base: FloatArray, other: FloatArray) -> FloatArray:
+    """Return a path whose steps are those of `own`, and what those of `other` have more than those of `base`."""
+    more = geometry.between(other[:-1], other[1:]) - geometry.between(base[:-1], base[1:])
+    out = [own[0]]
+    for step in geometry.between(own[:-1], own[1:]) + more:
+        out.append(geometry.compose(out[-1], step))
+    return np.array(out)

@@ -61,7 +61,9 @@ class ScanModel:
         mean, sd = self.of(expected_from(shots, settings, around))
         place = (doubts(shots) * self.factors[[1, 1, 2]])[:, np.newaxis]
         total, first, second, farthest = np.zeros((4, *mean.shape))
-        for move in np.random.default_rng(0).normal(0.0, _WIDER, (_draws(len(mean)), 3)):
+        for move in np.random.default_rng(0).normal(
+            0.0, _WIDER, (int(np.clip(_LOOKS // max(len(mean), 1), *_DRAWS)), 3)
+        ):
             weight = float(np.exp(-0.5 * move @ move * (1 - _WIDER**-2)))
             hits = hits_of(shots, settings, 0, shift=move * place, like=around[0])
             off = predict(shots, settings, hits, 0) - mean
@@ -110,10 +112,6 @@ def expected_from(shots: Shots, settings: Sequence[EffectSetting], around: Seque
         shared[:, :, i] = 0.5 * (high - low)
     parts = np.array([own, moved[0] + moved[1], moved[2], np.ones_like(mean)])
     return Expected(mean, parts, shared, usable_beams(shots, seen, np.nan_to_num(mean)))
-
-
-def _draws(scans: int) -> int:
-    return int(np.clip(_LOOKS // max(scans, 1), *_DRAWS))
 
 
 def doubts(shots: Shots) -> FloatArray:

@@ -12,8 +12,7 @@ from kurumaisu import geometry
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import Drive, driven, prepare_all
 from kurumaisu.critic.noise.base_noise import Noise
-from kurumaisu.critic.predict.motion import Forecast, motion_ahead
-from kurumaisu.critic.predict.reference_path import Paths
+from kurumaisu.critic.predict.motion import Forecast, Paths, motion_ahead
 from kurumaisu.critic.ranges.scans.beams import Shots, Track, thin
 from kurumaisu.critic.ranges.scans.gathering import columns_at, gather, past_at, rates_at, together
 from kurumaisu.critic.values.recording import Recording, Run
@@ -56,10 +55,6 @@ class ScanPoses:
             known={**columns_at(run, self._base.known, stamps), **rates_at(tracks, owner, stamps)},
             past=past_at(run, stamps),
         )
-
-    def trained(self) -> list[Shots]:
-        """Return shots of the runs to fit, few of them, per run."""
-        return [shots for _, shots in self.trained_runs()]
 
     def trained_runs(self) -> list[tuple[Run, Shots]]:
         """Return the runs to fit, each with few of its shots."""

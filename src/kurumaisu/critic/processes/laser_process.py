@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.critic.ranges.scans.gathering import why_not_usable
-from kurumaisu.critic.values.laser_finding import LaserFinding
+from kurumaisu.critic.values.criticism import LaserFinding
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model, load_model
 
@@ -29,13 +29,18 @@ def criticise_in_own_process(
     model_file: of the model, whose laws of the voltages no scan depends on.
     It makes no difference to the result where that happens; what fails in the other process is done again in this one.
     """
-    worker = Worker() if _worth_it(recording) else None
+    scans = sum(len(run.scan.t) for run in recording.runs if run.scan is not None)
+    apart = scans >= _MANY and len(os.sched_getaffinity(0)) > 1 and why_not_usable(recording) is None
+    worker = Worker() if apart else None
     if worker is not None:
         worker.send(_criticise, recording, model_file, ids)
 
     def finding(progress: Tell) -> LaserFinding:
-        found = None if worker is None else _received(worker)
-        return found or criticise_scans(recording, model, progress, ids)
+        found = None
+        with suppress(EOFError):  # it has died, of whatever it was
+            while worker is not None and isinstance(found := worker.receive(), ProgressMessage):
+                pass
+        return found if isinstance(found, LaserFinding) else criticise_scans(recording, model, progress, ids)
 
     try:
         yield finding
@@ -44,20 +49,5 @@ def criticise_in_own_process(
             worker.close()
 
 
-def _worth_it(recording: Recording) -> bool:
-    scans = sum(len(run.scan.t) for run in recording.runs if run.scan is not None)
-    return scans >= _MANY and len(os.sched_getaffinity(0)) > 1 and why_not_usable(recording) is None
-
-
 def _criticise(recording: Recording, model_file: Path, ids: frozenset[str] | None, progress: Tell) -> LaserFinding:
     return criticise_scans(recording, load_model(model_file), progress, ids)
-
-
-def _received(worker: Worker) -> LaserFinding | None:
-    """Return what came of it; None where the process has died, of whatever it was."""
-    try:
-        while isinstance(found := worker.receive(), ProgressMessage):
-            pass
-    except EOFError:
-        return None
-    return found if isinstance(found, LaserFinding) else None

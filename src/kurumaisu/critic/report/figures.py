@@ -170,11 +170,6 @@ def shown_points(misfit: Misfit) -> Shown:
     return Shown(index, low, high)
 
 
-def _rounded(number: re.Match[str]) -> str:
-    """Return a coordinate to a hundredth of a point: nobody sees more, and it is half of the page."""
-    return f"{float(number[0]):.2f}"
-
-
 def _dots(uses: re.Match[str]) -> str:
     """Return many small markers as a few paths of dots, which take a fifth of the room."""
     at = [f"M{float(x):.1f} {float(y):.1f}h0" for x, y in _AT.findall(uses[0])]
@@ -223,6 +218,8 @@ def _svg(figure: Figure, name: str) -> str:
     text = re.sub(r"(href=\"|url\()#", rf"\1#{name}-", text)
     for stand_in, variable in _VARIABLES.items():
         text = text.replace(stand_in, variable)
-    text = _USES.sub(_dots, _PATH.sub(lambda found: _LONG.sub(_rounded, found[0]), text))
+    # A coordinate to a hundredth of a point: nobody sees more, and it is half of the page.
+    text = _PATH.sub(lambda path: _LONG.sub(lambda number: f"{float(number[0]):.2f}", path[0]), text)
+    text = _USES.sub(_dots, text)
     # The page sets the size; the picture itself is hidden from screen readers, which get the figure's label.
     return re.sub(r'<svg (.*?)height="[^"]*"(.*?)width="[^"]*"', r'<svg aria-hidden="true" \1\2', text, count=1)

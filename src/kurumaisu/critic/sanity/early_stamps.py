@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem, log_posterior
 from kurumaisu.critic.search import search
-from kurumaisu.critic.values.progress import Progress
+from kurumaisu.critic.values.criticism import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
 
@@ -49,15 +49,13 @@ def restamped(drive: Drive, by: float) -> Drive:
 
 
 def tolerated_lead(runs: Sequence[Run]) -> float:
-    """Return the lead [s] up to which it is a matter of taste: a stamp may mean either end of a period."""
-    return _TASTE * period(runs)
+    """Return the lead [s] up to which it is a matter of taste: a stamp may mean either end of a period.
 
-
-def period(runs: Sequence[Run]) -> float:
-    """Return the longest time between rows of poses or inputs [s], but no pause; a single row is held throughout."""
+    That is the longest time between rows of poses or inputs, but no pause; a single row is held throughout.
+    """
     parts = [part for run in runs for part in (run.pose, run.voltage or run.command or run.odom)]
     steps = [np.diff(part.t) for part in parts if part is not None]
-    return min(max(float(np.median(some)) if len(some) else _PAUSE for some in steps), _PAUSE)
+    return _TASTE * min(max(float(np.median(some)) if len(some) else _PAUSE for some in steps), _PAUSE)
 
 
 def problem(by: float) -> str:
@@ -65,14 +63,14 @@ def problem(by: float) -> str:
     return f"all runs: the motion comes {by:.3f} s before its command; try t of the reference pose {by:+.3f} s"
 
 
-def note(by: float) -> str:
-    """Return what was mended, in words."""
-    return f"all runs: the motion comes {by:.3f} s before its command: judged with the pose's stamps {by:+.3f} s"
-
-
-def beside_imu(by: float) -> str:
-    """Return what was mended where odometry is compared with an imu, in words."""
-    return f"all runs: the odometry comes {by:.3f} s after the imu: judged with the imu's stamps {by:+.3f} s"
+def note(by: float, *, imu: bool) -> str:
+    """Return what was mended, in words; imu: odometry is compared with one."""
+    late, of = (
+        ("the odometry comes {:.3f} s after the imu", "imu")
+        if imu
+        else ("the motion comes {:.3f} s before its command", "pose")
+    )
+    return f"all runs: {late.format(by)}: judged with the {of}'s stamps {by:+.3f} s"
 
 
 def _later(problem: Problem, by: float) -> Problem:

@@ -17,40 +17,36 @@ from kurumaisu.critic.sanity import (
     input_match,
     map_agreement,
     pose_jumps,
-    pose_stamps,
     rates,
     rows,
-    scans,
-    spans,
-    time_units,
-    voltage_law,
-    voltages,
+    units,
 )
 from kurumaisu.critic.sanity.headings import Course
 from kurumaisu.critic.sanity.input_match import Match
-from kurumaisu.critic.sanity.rates import Rates
+from kurumaisu.critic.sanity.rates import Rates, of_input
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 from kurumaisu.world import load_world
 
-# A reference may be written twice as often as it measures, but not this often.
-_REPEATS = 3.0
-# Every row twice is such a reference; some rows twice is a buffer that was stuck.
-_SOME_TWICE = (1.04, 1.7)
-
 
 def examine(recording: Recording, model: Model) -> Faults:
     """Return what is wrong with the runs to fit and to judge by, in words that begin with the run's name."""
     faults = Faults()
-    segments, laser = _segments(recording), _mounted(recording, model)
+    compared = recording.world is not None and any(run.scan is not None for run in recording.runs)
+    segments = load_world(recording.world).segments if compared and recording.world is not None else None
+    laser = _mounted(recording, model)
     told = []
     for run in recording.runs:
         words = _of_run(run, model)
         told += [(run, line) for line in [*words, *_of_scans(run, laser, model, None if words else segments)]]
     late = [line.startswith(map_agreement.CLOCKS) for _, line in told]
-    if any(late) and laser is not None and segments is not None and _drifts(recording, laser, model, segments):
-        told = [each for each, clock in zip(told, late, strict=True) if not clock]
+    if any(late) and laser is not None and segments is not None:
+        # A clock that runs fast or slow, which the catalogue has, no run alone can tell.
+        runs = [run for run in recording.runs if run.scan is not None]
+        both = [(run.scan, run.pose) for run in runs if run.scan and run.pose and run.pose_source == "measured"]
+        if map_agreement.drifts(both, laser, segments, _mean_error(model), time_zero(runs)):
+            told = [each for each, clock in zip(told, late, strict=True) if not clock]
     for run, line in [*told, *_copies(recording)]:
         faults.add(f"{run.name}: {line}", fatal=True)
     return faults
@@ -68,12 +64,6 @@ def _copies(recording: Recording) -> Iterator[tuple[Run, str]]:
             known[run.name] = own
 
 
-def _segments(recording: Recording) -> FloatArray | None:
-    """Return the walls of the recording's map; None where it has none, or nothing to compare it with."""
-    usable = any(run.scan is not None for run in recording.runs)
-    return load_world(recording.world).segments if recording.world is not None and usable else None
-
-
 def _mounted(recording: Recording, model: Model) -> LaserMount | None:
     """Return the laser of the recording, else the model's; None where its fan cannot be that of the scans."""
     laser = laser_of(model.laser, recording.laser, recording.runs)
@@ -87,17 +77,10 @@ def _of_scans(run: Run, laser: LaserMount | None, model: Model, segments: FloatA
     """Return what is wrong with scans; segments (m, 4) of the map [m], None to leave it out."""
     if run.scan is None or len(run.scan.t) < 2:
         return []
-    words = scans.problems(run.scan, run.pose, laser, model.laser.range_max)
+    words = rows.problems(run.scan, run.pose, laser, model.laser.range_max)
     if words or laser is None or segments is None or run.pose is None or run.pose_source != "measured":
         return words
     return _one(map_agreement.problem(run.scan, run.pose, laser, segments, _mean_error(model)))
-
-
-def _drifts(recording: Recording, laser: LaserMount, model: Model, segments: FloatArray) -> bool:
-    """Tell whether the laser's clock runs fast or slow, which the catalogue has: no run alone can tell it."""
-    runs = [run for run in recording.runs if run.scan is not None]
-    both = [(run.scan, run.pose) for run in runs if run.scan and run.pose and run.pose_source == "measured"]
-    return map_agreement.drifts(both, laser, segments, _mean_error(model), time_zero(runs))
 
 
 def _mean_error(model: Model) -> FloatArray:
@@ -107,17 +90,22 @@ def _mean_error(model: Model) -> FloatArray:
 
 
 def _of_run(run: Run, model: Model) -> list[str]:
-    untimely = time_units.problems(run) or spans.problems(run)
-    if untimely or run.pose is None or len(run.pose.t) < 3:
-        return untimely
+    wrong = units.untimely(run) or units.endless(run)
+    if wrong or run.pose is None or len(run.pose.t) < 3:
+        return wrong
     found = headings.course(run.pose)
     pose = _mended(run.pose, found)
-    inputs = [(name, part, rates) for name, part in _inputs(run) if (rates := _rates(part, pose)) is not None]
+    parts = (("command", run.command), ("voltage", run.voltage), ("odometry", run.odom))
+    there = [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
+    inputs = [(name, part, rates) for name, part in there if (rates := _rates(part, pose)) is not None]
     known, lawful, follows = [], True, dict[str, FloatArray]()
     for name, _, rates in inputs:
-        asked = rates[0] if name != "voltage" else _from_volts(run, rates[1], model)
+        asked = rates[0]
+        if name == "voltage":
+            t, v, w = from_voltages(run, model)
+            asked = of_input(t, np.column_stack([v, w]), rates[1].t)
         plain = input_match.compare(asked, rates[1], name)
-        match = voltage_law.match(run, name, plain, rates[1], model) if name != "odometry" else plain
+        match = units.match(run, name, plain, rates[1], model) if name != "odometry" else plain
         known.append((name, match, _number(*rates)))
         follows[name] = plain.correlation
         lawful &= match is plain
@@ -127,7 +115,7 @@ def _of_run(run: Run, model: Model) -> list[str]:
     words += [] if found is not None and not found.right else imu_match.problems(run)
     # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.
     measured = run.pose_source == "measured"
-    words += _one(pose_stamps.problem(run.pose)) if measured else []
+    words += _one(pose_jumps.problem(run.pose)) if measured else []
     told = [
         line
         for name, part, rates in inputs
@@ -146,31 +134,16 @@ def _one(words: str | None) -> list[str]:
     return [] if words is None else [words]
 
 
-def _inputs(run: Run) -> list[tuple[str, Series]]:
-    parts = (("command", run.command), ("voltage", run.voltage), ("odometry", run.odom))
-    return [(name, part) for name, part in parts if part is not None and len(part.t) > 1]
-
-
 def _against(
     name: str, part: Series, pose: Series | None, rates: tuple[Rates, Rates], model: Model, follows: FloatArray
 ) -> list[str]:
     """Return what is wrong with an input, or with measured poses in its light; follows: as volts have it."""
-    words = voltages.problems(part, rates[1], model, follows) if name == "voltage" else []
+    words = units.problems(part, rates[1], model, follows) if name == "voltage" else []
     if pose is None:
         return words
-    times = rows.repeats(pose, rates[1])
-    words += [rows.repeats_problem(times)] if times > _REPEATS or _SOME_TWICE[0] < times < _SOME_TWICE[1] else []
-    for check in (
-        rows.frozen(pose, *rates),
-        rows.coarse(pose, rates[1]),
-    ):
+    for check in (rows.repeated(pose, rates[1]), rows.frozen(pose, rates[0]), rows.coarse(pose, rates[1])):
         words += _one(check)
     return words
-
-
-def _from_volts(run: Run, driven: Rates, model: Model) -> Rates:
-    t, v, w = from_voltages(run, model)
-    return rates.of_input(t, np.column_stack([v, w]), driven.t)
 
 
 def _mended(pose: Series, found: Course | None) -> Series:

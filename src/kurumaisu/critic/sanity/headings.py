@@ -39,7 +39,6 @@ class Course:
     agreement: float
     ahead: float
     plain: float
-    windows: int
 
     @property
     def right(self) -> bool:
@@ -60,7 +59,7 @@ def course(pose: Series) -> Course | None:
         best = 1.0
     offset = float(np.angle(resultants[best])) / 2
     ahead = float(np.sum(weight * (np.cos(along - best * middle - offset) > 0)) / weight.sum())
-    return Course(best, offset, float(abs(resultants[best])), ahead, float(abs(resultants[1.0])), len(weight))
+    return Course(best, offset, float(abs(resultants[best])), ahead, float(abs(resultants[1.0])))
 
 
 def folded(pose: Series) -> str | None:
@@ -87,7 +86,8 @@ def folded(pose: Series) -> str | None:
 
 def _windows(pose: Series) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return course and heading [rad] and weight of stretches that were driven, None where they are too few."""
-    t, xy, theta = _thinned(pose)
+    keep = np.unique(np.searchsorted(pose.t, np.arange(pose.t[0], pose.t[-1], _APART)))
+    t, xy, theta = pose.t[keep], pose.values[keep, :2], pose.values[keep, 2]
     step, turn = np.diff(xy, axis=0), np.diff(theta)
     way = np.hypot(*step.T)
     noise = position_noise(pose)
@@ -111,11 +111,6 @@ def _independent(weight: FloatArray) -> float:
 def position_noise(pose: Series) -> float:
     """Return a robust sd of the positions' fast noise [m], from third differences."""
     return float(third_difference_sd(pose.values[:, :2], None)) if len(pose.values) > 3 else 0.0
-
-
-def _thinned(pose: Series) -> tuple[FloatArray, FloatArray, FloatArray]:
-    keep = np.unique(np.searchsorted(pose.t, np.arange(pose.t[0], pose.t[-1], _APART)))
-    return pose.t[keep], pose.values[keep, :2], pose.values[keep, 2]
 
 
 def heading_words(found: Course, turns_agree: bool | None, goes_ahead: bool | None) -> str | None:

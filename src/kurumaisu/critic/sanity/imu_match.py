@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kurumaisu.critic.imu.yaw_rate import heading
-from kurumaisu.critic.values.digits import moment
+from kurumaisu.critic.values.digits import moment, times
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -96,11 +96,10 @@ def _witness(run: Run, found: Comparison) -> str:
 
 
 def _odd_words(found: Comparison) -> str:
-    times = "once" if len(found.spans) == 1 else f"{len(found.spans)} times"
     first, size = found.spans[0], found.sizes[0]
     return (
-        f"the heading of the reference turns otherwise than the imu says {times} (first: by {size:+.2g} rad from "
-        f"t = {moment(first[0])} to {moment(first[1])}): relocalised, or a gyro that was shaken"
+        f"the heading of the reference turns otherwise than the imu says {times(len(found.spans))} (first: by "
+        f"{size:+.2g} rad from t = {moment(first[0])} to {moment(first[1])}): relocalised, or a gyro that was shaken"
     )
 
 

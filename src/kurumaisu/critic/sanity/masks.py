@@ -1,25 +1,53 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of a reference that are off for a moment: they are set aside, and the rest is judged."""
+"""Rows of a reference that are off for a moment: they are set aside, and the rest is judged.
+
+Even a poor model says of the next moment how far the chair goes: what it gets wrong lasts, and does not come back.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
+from kurumaisu import geometry
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, prepare
 from kurumaisu.critic.sanity import imu_match
-from kurumaisu.critic.sanity.brief_errors import brief_errors
-from kurumaisu.critic.sanity.contacts import TOPIC, contacts
 from kurumaisu.critic.sanity.pose_jumps import jumps
+from kurumaisu.critic.sanity.rows import stretches
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.critic.values.robust import third_difference_sd
+from kurumaisu.errors import Error
 from kurumaisu.params import Model
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
 _BACK = 5.0  # [s] within which a reference that was elsewhere is back
 _SAME = 0.5  # share of its first jump that is left when it is back
 _MOST = 0.05  # share of a run's rows that may be set aside
+_FAR = 8.0  # sds of what a model leaves between two rows
+_LONGEST = 1.0  # [s]
+_RETURN = 0.4  # share of the way out, of which the way back may differ
+_QUIET = 0.35  # the same, that another row near by may be off
+_NEAR = 2  # rows
+# Of a normal vector's components, by the number of them, over the median of its norm.
+_SD = {1: SIGMA_PER_MAD, 2: 0.8493}
+TOPIC = "collision"  # a quantity that says so itself
+_ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
+_STANDS = 0.15  # share of that below which it stands
+_LATEST = 0.6  # [s] by which a chair may answer late
+_BEFORE = 0.2  # [s] beyond that for which it must have been asked, in whichever axis
+_NOISE = 3.0  # sds of such a rate by errors of the reference, that one which stands may seem to have
+_MOST_SEEN = 0.5  # share of what it is asked for that it may seem to have by them
+_WINDOW = 0.4  # [s] over which its rates are taken
+_LEAST = 0.4  # [s] of standing, beyond the window
+_LIKE = (0.7, 1.4)  # times what is asked for, of which it is known what the chair does elsewhere
+_MOVES = 0.7  # share of that time in which it moves, at least
+_MARGINS = (0.4, 1.0)  # [s] before and after, in which it is stopped, and gets going again
 
 
 def set_aside(recording: Recording, model: Model) -> Recording:
@@ -34,11 +62,11 @@ def set_aside(recording: Recording, model: Model) -> Recording:
         turned, odd = imu_match.odd(kept)
         others = {name: series for name, series in kept.covariates.items() if name != TOPIC}
         runs.append(replace(kept, aside=(*kept.aside, *held, *turned), covariates=others))
-        notes += [*words, *([_held(kept, held)] if held else []), *([odd] if odd else [])]
+        notes += [*words, *([_told_contacts(kept, held)] if held else []), *([odd] if odd else [])]
     return replace(recording, runs=tuple(runs), problems=(*recording.problems, *notes))
 
 
-def _held(run: Run, spans: Sequence[tuple[float, float]]) -> str:
+def _told_contacts(run: Run, spans: Sequence[tuple[float, float]]) -> str:
     """Return in words when and where a chair was held."""
     (first, end), *more = spans
     place = ""
@@ -63,14 +91,14 @@ def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
         off[first:end] = True
     if off.mean() > _MOST:
         return run, []
-    kept, words = (replace(run, pose=_without(pose, off)), [_told(run.name, pose, spans, off)]) if spans else (run, [])
+    kept, words = (replace(run, pose=pose.rows(~off)), [_told(run.name, pose, spans, off)]) if spans else (run, [])
     assert kept.pose is not None
     brief = brief_errors(kept, model)
     if not brief.any() or brief.mean() > _MOST:
         return kept, words
     begun = moment(float(kept.pose.t[int(np.argmax(brief))]))
     more = f"{run.name}: the reference is off for a moment at t = {begun}: {_rows(brief)}"
-    return replace(kept, pose=_without(kept.pose, brief)), [*words, more]
+    return replace(kept, pose=kept.pose.rows(~brief)), [*words, more]
 
 
 def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
@@ -113,10 +141,6 @@ def _alone(pose: Series, row: int) -> bool:
     return bool(np.hypot(*left) < _SAME * np.hypot(*jump))
 
 
-def _without(pose: Series, off: BoolArray) -> Series:
-    return Series(pose.t[~off], pose.values[~off], pose.columns)
-
-
 def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: BoolArray) -> str:
     first, end, far = spans[0]
     where = (
@@ -130,3 +154,110 @@ def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: Boo
 
 def _rows(off: BoolArray) -> str:
     return f"{int(off.sum())} of its {len(off)} rows set aside ({100 * off.mean():.2g} %)"
+
+
+def brief_errors(run: Run, model: Model) -> BoolArray:
+    """Return which rows of a run's reference are off for a moment, (n,)."""
+    assert run.pose is not None
+    off = np.zeros(len(run.pose.t), dtype=np.bool_)
+    try:
+        drive = prepare(run, model, interval=1e-9)
+    except Error:
+        return off
+    left = drive.in_map(drive.measured - replay.increments(drive, model, ()))
+    rows = np.zeros(len(drive.times), dtype=np.bool_)
+    for part in (left[:, :2], left[:, 2:]):
+        for first, end in _excursions(part, drive.times):
+            rows[first:end] = True
+    off[np.searchsorted(run.pose.t, drive.times[rows])] = True
+    return off
+
+
+def _excursions(left: FloatArray, times: FloatArray) -> list[tuple[int, int]]:
+    """Return first row and end of each excursion, by what is left of increments (m, k) between rows at times (m + 1,).
+
+    A chair that is late is off throughout the time that it is, and a row that is off only in its first step and last.
+    """
+    size = np.linalg.norm(left, axis=1)
+    limit = _FAR * _SD[left.shape[1]] * float(np.median(size)) if len(size) else 0.0
+    found = []
+    loud = np.flatnonzero(size > max(limit, 1e-6))
+    for i, j in pairwise(loud):
+        between = np.r_[max(i - _NEAR, 0) : i, i + 1 : j, j + 1 : min(j + _NEAR + 1, len(size))]
+        back = np.linalg.norm(left[i] + left[i + 1 : j + 1].sum(axis=0)) < _RETURN * size[i]
+        if back and times[j + 1] - times[i] < _LONGEST and (size[between] < _QUIET * size[i]).all():
+            found.append((int(i) + 1, int(j) + 1))
+    return found
+
+
+def contacts(run: Run, model: Model) -> tuple[tuple[float, float], ...]:
+    """Return the spans of time [s] in which the chair was held, by a quantity that says so, else by its motion."""
+    spans = _said(run.covariates[TOPIC]) if TOPIC in run.covariates else _seen(run, model)
+    return _merged([(a - _MARGINS[0], b + _MARGINS[1]) for a, b in spans])
+
+
+def _said(series: Series) -> Iterator[tuple[float, float]]:
+    """Yield the spans in which a quantity is not 0; each value holds until the next."""
+    ends = np.append(series.t[1:], series.t[-1])
+    for a, b in zip(*stretches(series.values[:, 0] != 0), strict=True):
+        yield float(series.t[a]), float(ends[b - 1])
+
+
+def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
+    if run.pose is None or run.pose_source != "measured":
+        return
+    try:
+        drive = prepare(run, model)
+    except Error:
+        return
+    t = drive.start + GRID * np.arange(len(drive.v))
+    after = np.clip(np.searchsorted(run.pose.t, t), 1, len(run.pose.t) - 1)
+    inside = (t > drive.times[0] + _WINDOW) & (t < drive.times[-1] - _WINDOW)
+    inside &= run.pose.t[after] - run.pose.t[after - 1] < _WINDOW  # nobody knows what is within a gap
+    asked = np.column_stack([drive.v, drive.w])
+    ends = (geometry.interpolate(run.pose.t, run.pose.values[:, :3], t + by) for by in (-_WINDOW / 2, _WINDOW / 2))
+    driven = np.abs(geometry.between(*ends)[:, [0, 2]] / _WINDOW)
+    late = _BEFORE + _answer(np.abs(asked[inside]), driven[inside])
+    wanted = _held((np.abs(asked) > _ASKED).any(axis=1), round(late / GRID))
+    small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
+    sds = third_difference_sd(run.pose.values[:, :3]) if len(run.pose.t) > 3 else np.zeros(3)
+    sds = np.sqrt(2) / _WINDOW * np.array([max(sds[:2]), sds[2]])  # of rates, by errors that differ from row to row
+    small = np.minimum(np.hypot(small, _NOISE * sds), np.maximum(_MOST_SEEN * _ASKED, small))
+    stands = inside & wanted & (driven < small).all(axis=1)
+    for a, b in zip(*stretches(stands), strict=True):
+        if (b - a) * GRID >= _LEAST and _is_odd(asked[a:b], asked, wanted, stands):
+            yield float(t[a]), float(t[b - 1])
+
+
+def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: BoolArray) -> bool:
+    """Tell whether the chair moves elsewhere when about the same is asked for."""
+    size = np.maximum(np.median(np.abs(here), axis=0), _ASKED)
+    as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
+    alike = wanted & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
+    return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
+
+
+def _answer(asked: FloatArray, driven: FloatArray) -> float:
+    """Return by how much [s] what is driven (n, 2) is behind what is asked, where they are most alike."""
+    one, other = (np.linalg.norm(rates / _ASKED, axis=1) for rates in (asked, driven))
+    shifts = [k for k in range(round(_LATEST / GRID) + 1) if k < len(one) - 1]
+    alike = [one[: len(one) - k] @ other[k:] / max(float(np.linalg.norm(one[: len(one) - k])), 1e-9) for k in shifts]
+    return GRID * shifts[int(np.argmax(alike))] if shifts else _LATEST
+
+
+def _held(flags: BoolArray, count: int) -> BoolArray:
+    """Return where flags (n,) have held for so many samples."""
+    sums = np.concatenate([[0], np.cumsum(flags)])
+    out = np.zeros_like(flags)
+    out[count - 1 :] = sums[count:] - sums[:-count] == count
+    return out
+
+
+def _merged(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
+    out: list[tuple[float, float]] = []
+    for a, b in sorted(spans):
+        if out and a <= out[-1][1]:
+            out[-1] = out[-1][0], max(out[-1][1], b)
+        else:
+            out.append((a, b))
+    return tuple(out)

@@ -14,8 +14,7 @@ from kurumaisu import effects
 from kurumaisu.critic.ranges.noise.scan_noise import CommonMode
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
-from kurumaisu.critic.values.policy import NAMED, RIVAL
-from kurumaisu.critic.values.prior import log_prior
+from kurumaisu.critic.values.policy import NAMED, RIVAL, log_prior
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.effects import Echoes, Parameter

@@ -20,7 +20,7 @@ from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.critic.unknown.curves import curve_evidence
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 

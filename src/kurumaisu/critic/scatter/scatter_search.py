@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
-from kurumaisu.critic.values.prior import log_prior, occam
+from kurumaisu.critic.values.policy import log_prior, occam
 from kurumaisu.critic.values.story import Comparison
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting

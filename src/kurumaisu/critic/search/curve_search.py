@@ -20,7 +20,7 @@ from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, Design, curve_evidences
 from kurumaisu.critic.unknown.curves import columns as columns_of
 from kurumaisu.critic.unknown.step_curves import fine_curves, gains_over_own_rate, step_curves
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
 _DRAWN = 0.8  # share of a signal's square that a curve can draw, from which it is one

@@ -12,8 +12,7 @@ from scipy.special import logsumexp
 from kurumaisu.critic.engine.catalogue import Candidate
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.search.curve_search import CurveSearch, SetWithCurve
-from kurumaisu.critic.values.policy import MEMBER, NAMED
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.policy import MEMBER, NAMED, UNKNOWN_ODDS
 from kurumaisu.types import FloatArray
 
 _MOST = 7  # members of a set: more may be a chance leaving that everything explains a little

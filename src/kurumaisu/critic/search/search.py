@@ -17,7 +17,7 @@ from kurumaisu.critic.engine.covariance import Covariance
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.search.curve_search import CurveSearch, nearly_same_rates
 from kurumaisu.critic.search.posterior import SearchResult, posterior
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS, log_prior, occam
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS, log_prior, occam
 from kurumaisu.types import FloatArray
 
 _FACTORS = (0.25, 1.0, 4.0, 16.0, 64.0)  # of a term's step: sizes that are tried first, either way

@@ -20,7 +20,7 @@ from kurumaisu.critic.base.drive import Drive, edges_of
 from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset, root_of
-from kurumaisu.critic.values.prior import Z_HIGH, Z_LOW, Z_USUAL
+from kurumaisu.critic.values.policy import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 

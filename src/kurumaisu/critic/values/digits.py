@@ -47,11 +47,16 @@ def moment(t: float) -> str:
     return f"{f'{t:.3f}'.rstrip('0').rstrip('.')} s"
 
 
+def times(count: int) -> str:
+    """Return how often something was, in words."""
+    return "once" if count == 1 else f"{count} times"
+
+
 def odds(nats: float) -> str:
     """Return how many times as probable a log evidence makes something, to one digit or as a power of ten."""
     if nats < math.log(1e4):
-        times = math.exp(max(nats, 0.0))
-        return f"{times:.1f}" if times < 3 else f"{float(f'{times:.1g}'):,.0f}".replace(",", " ")
+        factor = math.exp(max(nats, 0.0))
+        return f"{factor:.1f}" if factor < 3 else f"{float(f'{factor:.1g}'):,.0f}".replace(",", " ")
     return "more than 10 000"
 
 

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from kurumaisu.params import Robot
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,10 @@ class Series:
     def of_table(cls, table: FloatArray, *columns: str) -> Series:
         """Return the series of a table (n, 1 + m) whose first column is t."""
         return cls(table[:, 0], table[:, 1:], columns)
+
+    def rows(self, keep: BoolArray | IntArray) -> Series:
+        """Return some of its samples."""
+        return Series(self.t[keep], self.values[keep], self.columns)
 
     def column(self, name: str) -> FloatArray:
         """Return one column, (n,)."""
@@ -75,19 +80,14 @@ class Run:
     imu: Series | None = None
     courses: bool = False
 
+    def parts(self, *names: str) -> dict[str, Series]:
+        """Return those of some parts that it has, by name; of all, where none is named."""
+        return {name: part for name in names or PARTS if (part := getattr(self, name)) is not None}
 
-def run_of_parts(name: str, parts: Mapping[str, Series | None], covariates: dict[str, Series]) -> Run:
+
+def run_of_parts(name: str, parts: Mapping[str, Any], covariates: dict[str, Series]) -> Run:
     """Return the run that its tables make; those that are not among parts are missing."""
-    return Run(
-        name=name,
-        command=parts.get("command"),
-        voltage=parts.get("voltage"),
-        pose=parts.get("pose"),
-        odom=parts.get("odom"),
-        scan=parts.get("scan"),
-        imu=parts.get("imu"),
-        covariates=covariates,
-    )
+    return Run(name, covariates=covariates, **{part: parts[part] for part in PARTS if part in parts})
 
 
 @dataclass(frozen=True)

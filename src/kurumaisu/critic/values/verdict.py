@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""The critic's answer as values, and verdict.json: written and read against verdict.schema.json."""
+"""The critic's answer as values, and verdict.json: written against verdict.schema.json."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any, Literal
 
 import jsonschema
 
-from kurumaisu.bounded_files import MOST_TEXT, read_text
 from kurumaisu.errors import Error
 
 SCHEMA_VERSION = 1
@@ -171,7 +170,7 @@ def to_json(verdict: Verdict) -> dict[str, Any]:
     Raise Error naming the field for a number that is not finite or anything the schema forbids.
     """
     content = {"schema": SCHEMA_VERSION, **json.loads(json.dumps(asdict(verdict)))}
-    _check(content, "verdict")
+    _check(content)
     return content
 
 
@@ -180,72 +179,17 @@ def verdict_text(verdict: Verdict) -> str:
     return json.dumps(to_json(verdict), indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def read_verdict(path: Path) -> Verdict:
-    """Read verdict.json. Raise Error naming the file, and the field where there is one."""
-    try:
-        content = json.loads(read_text(path, MOST_TEXT))
-    except (ValueError, RecursionError) as error:
-        raise Error(f"{path}: is not JSON: {error}") from error
-    _check(content, str(path))
-    return Verdict(
-        verdict=content["verdict"],
-        causes=tuple(_cause(item) for item in content["causes"]),
-        confounded=tuple(tuple(ids) for ids in content["confounded"]),
-        unknown=tuple(Unknown(**item) for item in content["unknown"]),
-        problems=tuple(content["problems"]),
-        next_experiment=_next_experiment(content["next_experiment"]),
-        gain=_gain(content["gain"]),
-        robot=_robot(content.get("robot")),
-    )
-
-
-def _cause(item: dict[str, Any]) -> Cause:
-    parameters = {name: Estimate(**value) for name, value in item["parameters"].items()}
-    return Cause(item["id"], item["p"], parameters, item["gain_nats"])
-
-
-def _next_experiment(item: dict[str, Any] | None) -> NextExperiment | None:
-    return None if item is None else NextExperiment(**{**item, "separates": tuple(item["separates"])})
-
-
-def _robot(item: dict[str, Any] | None) -> RobotTaken | None:
-    if item is None:
-        return None
-    given = item["multipliers"]
-    values: dict[str, Any] = {k: Estimate(**v) if isinstance(v, dict) else v for k, v in (given or {}).items()}
-    return RobotTaken(item["kind"], item["assumed"], Multipliers(**values) if values else None)
-
-
-def _gain(item: dict[str, Any] | None) -> Gain | None:
-    if item is None:
-        return None
-    rmse = {name: RmseGain(**value) for name, value in item["rmse"].items()}
-    channels = {name: _channel(value) for name, value in item.get("channels", {}).items()}
-    return Gain(LogDensityGain(**item["log_density_per_sample"]), rmse, channels, _slam(item.get("slam")))
-
-
-def _channel(item: dict[str, Any]) -> ChannelGain:
-    rmse = item["rmse"]
-    return ChannelGain(LogDensityGain(**item["log_density_per_sample"]), None if rmse is None else RmseGain(**rmse))
-
-
-def _slam(item: dict[str, Any] | None) -> SlamGain | None:
-    if item is None:
-        return None
-    return SlamGain(item["run"], item["scans"], RmseGain(**item["position"]), RmseGain(**item["heading"]))
-
-
-def _check(content: Any, where: str) -> None:
+def _check(content: Any) -> None:
     for name, value in _numbers(content, ""):
         if not -math.inf < value < math.inf:  # of integers, too, whatever their length
-            raise Error(f"{where}: {name}: must be a finite number: {value}")
+            raise Error(f"verdict: {name}: must be a finite number: {value}")
     schema = json.loads(Path(__file__).with_name("verdict.schema.json").read_text(encoding="utf-8"))
     fault = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(content))
     if fault is not None:
-        raise Error(f"{where}: {'.'.join(map(str, fault.absolute_path)) or 'the file'}: {fault.message}")
+        raise Error(f"verdict: {'.'.join(map(str, fault.absolute_path)) or 'the file'}: {fault.message}")
     for name, part in _intervals(content, ""):
         if part["lo90"] > part["hi90"]:
-            raise Error(f"{where}: {name}: lo90 {part['lo90']:g} is above hi90 {part['hi90']:g}")
+            raise Error(f"verdict: {name}: lo90 {part['lo90']:g} is above hi90 {part['hi90']:g}")
 
 
 def _numbers(content: Any, name: str) -> Iterator[tuple[str, float]]:

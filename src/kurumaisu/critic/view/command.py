@@ -16,8 +16,7 @@ from kurumaisu import program, settings
 from kurumaisu.critic.app.options import name_list
 from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.values.recording import Recording
-from kurumaisu.critic.view.album import read_album
-from kurumaisu.critic.view.tape import Showing
+from kurumaisu.critic.view.tape import Showing, read_album
 from kurumaisu.errors import Error, failed
 from kurumaisu.params import Model, load_model, shipped
 from kurumaisu.viewer import Hub, Server, Source, ViewerSettings, read_settings, report

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kurumaisu.critic.experiment.rehearsal import Rehearsal
-from kurumaisu.critic.experiment.rehearse import manner
+from kurumaisu.critic.experiment.rehearse import Rehearsal, manner
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.experiments import Script, load_script
 from kurumaisu.params import Model, shipped

@@ -21,12 +21,11 @@ from sensor_msgs.msg import BatteryState, LaserScan, Temperature
 from kurumaisu import program
 from kurumaisu.critic.app.options import add_effects, whole_number
 from kurumaisu.critic.app.results import causes
-from kurumaisu.critic.app.watch import ContinuousCritic, WatchedCriticism
-from kurumaisu.critic.app.window import Heard, Window
+from kurumaisu.critic.app.watch import ContinuousCritic, Heard, WatchedCriticism, Window
 from kurumaisu.critic.bags import messages
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.consistency import check_run, usable
 from kurumaisu.critic.data.meta import Meta, read_meta, recording_of_meta
+from kurumaisu.critic.data.reading import check_run, usable
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.selection import effect_ids
 from kurumaisu.errors import Error, one_line

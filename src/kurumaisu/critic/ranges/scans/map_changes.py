@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation
 from scipy.spatial import cKDTree
 
 from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
-from kurumaisu.critic.values.laser_finding import UNKNOWN_CHANNEL
+from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.geometry import wrap
 from kurumaisu.types import BoolArray, FloatArray, IntArray

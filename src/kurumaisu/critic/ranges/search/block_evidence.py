@@ -17,7 +17,7 @@ from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
 from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS, odds
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS, odds
 from kurumaisu.types import FloatArray, IntArray
 
 BEYOND = 3.0  # [nat] by which a curve must beat the best set of the catalogue, where nothing may act at all

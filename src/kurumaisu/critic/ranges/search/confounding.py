@@ -15,7 +15,7 @@ from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock, without_
 from kurumaisu.critic.ranges.search.effect_sets import FittedForms, FormPosterior
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.unknown.curves import curve_evidence
-from kurumaisu.critic.values.prior import odds
+from kurumaisu.critic.values.policy import odds
 from kurumaisu.types import FloatArray
 
 _LOSS = 3.0  # [nat] of log likelihood that a twin may explain less, a half for each parameter more

@@ -10,8 +10,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.values.policy import NAMED, RIVAL
-from kurumaisu.critic.values.prior import Z_LOW, log_prior, occam
+from kurumaisu.critic.values.policy import NAMED, RIVAL, Z_LOW, log_prior, occam
 from kurumaisu.types import FloatArray
 
 _LARGEST = 5  # effects in a set

@@ -18,8 +18,8 @@ from kurumaisu.critic.ranges.search.effect_sets import FittedForms
 from kurumaisu.critic.ranges.search.misfits import Part, misfits
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import STRONG, ParameterFit, strength
-from kurumaisu.critic.values.laser_finding import LaserFinding
-from kurumaisu.critic.values.prior import Z_LOW
+from kurumaisu.critic.values.criticism import LaserFinding
+from kurumaisu.critic.values.policy import Z_LOW
 from kurumaisu.critic.values.verdict import Cause
 from kurumaisu.effects import BeamEffect, LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting

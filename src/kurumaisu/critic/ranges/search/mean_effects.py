@@ -23,7 +23,7 @@ from kurumaisu.critic.ranges.signals.coefficient_blocks import pose_curves
 from kurumaisu.critic.ranges.signals.effect_columns import Form
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
 from kurumaisu.critic.unknown.curves import curve_evidence
-from kurumaisu.critic.values.prior import UNKNOWN_ODDS
+from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.effects import Mechanism
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray

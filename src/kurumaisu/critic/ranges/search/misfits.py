@@ -11,8 +11,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.search.effect_sets import FormPosterior
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
-from kurumaisu.critic.values.binned_means import FOLLOWED, bins, explained
-from kurumaisu.critic.values.story import Alternative, Misfit, Moments, NoiseParameter
+from kurumaisu.critic.values.story import FOLLOWED, Alternative, Misfit, Moments, NoiseParameter, bins, explained
 from kurumaisu.types import FloatArray, IntArray
 
 _SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off

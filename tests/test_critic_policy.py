@@ -13,7 +13,7 @@ from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.search import search
-from kurumaisu.critic.values import prior
+from kurumaisu.critic.values import policy
 from kurumaisu.params import load_model, shipped
 
 GRAM = np.array([[900.0, 300.0], [300.0, 2500.0]])  # of columns per usual size
@@ -34,19 +34,19 @@ def by_quadrature(sizes):
     prior_of_z = np.where(z < 50, 0.9 / np.log(50 / 3), 0.1 / np.log(100)) / z
     squares = z[:, None] ** 2 - 2 * z[:, None] * (fitted @ ways) + fitted @ fitted
     mean = trapezoid(np.exp(-0.5 * squares) * density, angle, axis=1)
-    return float(np.log(trapezoid(prior_of_z * mean, z))) + float(prior.occam_plane(np.linalg.norm(fitted)))
+    return float(np.log(trapezoid(prior_of_z * mean, z))) + float(policy.occam_plane(np.linalg.norm(fitted)))
 
 
 @pytest.mark.parametrize("sizes", [(0.4, 0.4), (0.6, 0.3), (0.5, 0.05), (0.02, 0.5), (-0.2, 0.4)])
 def test_the_proportion_of_two_amplitudes_against_quadrature(sizes):
-    told = prior.in_proportion(np.array(sizes), np.linalg.inv(GRAM), GRAM)
+    told = policy.in_proportion(np.array(sizes), np.linalg.inv(GRAM), GRAM)
     assert told == pytest.approx(by_quadrature(np.array(sizes)), abs=0.25)
 
 
 def test_what_comes_together_is_cheaper_in_its_usual_proportion_only():
     spread = np.linalg.inv(GRAM)
     usual, tenth, against = (
-        prior.in_proportion(np.array(sizes), spread, GRAM) for sizes in ((0.4, 0.4), (0.4, 0.04), (-0.4, 0.4))
+        policy.in_proportion(np.array(sizes), spread, GRAM) for sizes in ((0.4, 0.4), (0.4, 0.04), (-0.4, 0.4))
     )
     assert usual > 1.0 > -1.0 > tenth
     assert against < -1.0
@@ -71,8 +71,8 @@ def test_what_lags_but_is_no_slower_is_hardly_a_load():
     load, z = cost_of("base.payload", {"size": 0.05, "ratio": 2.0})
     lag, weak = cost_of("base.payload", {"size": 0.001, "ratio": 100.0})
     assert weak > 0.5 * z
-    assert load < float(prior.occam_plane(np.array(z))) - 1.0
-    assert lag > float(prior.occam_plane(np.array(weak)))
+    assert load < float(policy.occam_plane(np.array(z))) - 1.0
+    assert lag > float(policy.occam_plane(np.array(weak)))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_what_has_a_direction_or_two_peculiarities_has_no_proportion(name, sizes
     """
     cost, z = cost_of(name, sizes)
     ways = (1 if name == "base.slope" else 3) / 0.3
-    assert cost == pytest.approx(float(prior.occam_plane(np.array(z))) + np.log(ways), abs=0.02)
+    assert cost == pytest.approx(float(policy.occam_plane(np.array(z))) + np.log(ways), abs=0.02)
 
 
 def test_one_effect_that_does_what_two_do_is_fitted_though_lines_tell_little_of_it():
