@@ -16,6 +16,7 @@ from kurumaisu.critic.base import drive, replay
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.heldout import materiality
 from kurumaisu.critic.heldout.materiality import simulates_nearer
+from kurumaisu.critic.values import policy
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.errors import Error
 from kurumaisu.params import load_model, shipped
@@ -253,10 +254,10 @@ def prior_density(x):
 def test_occam_factor_against_quadrature():
     z = np.array([0.0, 2.0, 5.0, 30.0])
     x = np.geomspace(3, 5000, 1_000_001)
-    for value, cost in zip(z, prior.occam(z), strict=True):
+    for value, cost in zip(z, policy.occam(z), strict=True):
         density = prior_density(x) / 2 * (np.exp(-0.5 * (value - x) ** 2) + np.exp(-0.5 * (value + x) ** 2))
         assert cost == pytest.approx(-np.log(trapezoid(density, x)), abs=0.02)
-    assert prior.occam(np.array(5.0), sides=1) == pytest.approx(prior.occam(np.array(5.0)) - np.log(2))
+    assert policy.occam(np.array(5.0), sides=1) == pytest.approx(policy.occam(np.array(5.0)) - np.log(2))
 
 
 def test_occam_factor_of_two_amplitudes_against_quadrature():
@@ -267,4 +268,4 @@ def test_occam_factor_of_two_amplitudes_against_quadrature():
         squares = (near[:, None] * np.cos(angle) - value) ** 2 + (near[:, None] * np.sin(angle)) ** 2
         mean = trapezoid(np.exp(-0.5 * squares), angle, axis=1) / (2 * np.pi)
         expected = -np.log(trapezoid(prior_density(near) * mean, near))
-        assert prior.occam_plane(np.array(value)) == pytest.approx(expected, abs=0.05)
+        assert policy.occam_plane(np.array(value)) == pytest.approx(expected, abs=0.05)
