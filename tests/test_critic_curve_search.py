@@ -71,7 +71,7 @@ def test_a_curve_and_an_effect_are_found_beside_each_other(seed):
     assert found.p_curves["smooth.v.heading"] > 0.9
 
 
-def driven_by(seed, *settings):
+def driven_by(seed, *settings, ids=("base.battery_sag", "base.gain_v", "base.lag_w")):
     """Return the problem of two drives that effects of a model file make, under a reference with noise."""
     rng = np.random.default_rng(seed)
     drives = recordings.draw_drives("rich", USUAL, rng, seconds=60.0, rate=10.0)
@@ -79,8 +79,7 @@ def driven_by(seed, *settings):
     paths = [replay.path(drive, MODEL, settings) for drive in plain]
     seen = [path + 0.005 * rng.standard_normal(path.shape) for path in paths]
     noisy = [drive.seen_at(drive.times, poses) for drive, poses in zip(plain, seen, strict=True)]
-    ids = frozenset({"base.battery_sag", "base.gain_v", "base.lag_w", "smooth"})
-    return Problem(noisy, MODEL, noise_of(USUAL), ids=ids)
+    return Problem(noisy, MODEL, noise_of(USUAL), ids=frozenset({*ids, "smooth"}))
 
 
 SLOW = EffectSetting(  # forward, by a fifth, for a while half a minute after the start
@@ -104,6 +103,20 @@ def test_a_curve_over_time_beside_a_lag_is_no_other_form_of_it(seed):
     best = CurveSearch(problem).beside(problem.fit(["base.lag_w"], {}))[0]
     assert (best.curve.id, best.form_of) == ("smooth.v_gain.time", frozenset())
     assert best.nats > 50
+
+
+def test_a_curve_of_the_turns_gain_over_the_speed_is_another_form_of_a_gain_with_understeer():
+    ids = ("base.gain_w", "base.understeer", "base.lag_w")
+    gain, slip = EffectSetting("base.gain_w", {"gain": 0.1}), EffectSetting("base.understeer", {"k": 0.3})
+    problem = driven_by(0, gain, slip, ids=ids)
+    curves = CurveSearch(problem)
+    one = next(each for each in curves.beside(nothing(problem)) if each.curve.id == "smooth.w_gain.abs_v")
+    both, other = problem.fit(ids[:2], {}), problem.fit(["base.lag_w"], {})
+    assert curves.as_form(one, [other, both]).form_of == set(ids[:2])
+    assert not curves.as_form(one, [other, problem.fit(ids[2:], {})]).form_of
+    found = search.search(problem, lambda _: None)
+    assert set(found.named) == set(ids[:2])
+    assert sum(found.p_curves.values()) < 0.1
 
 
 def test_columns_of_a_curve_have_its_size_before_the_data_and_move_no_size_of_the_set():

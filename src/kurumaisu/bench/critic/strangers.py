@@ -28,7 +28,7 @@ from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
-GENERATORS = ("cliff", "fen", "heath", "motors")
+GENERATORS = ("moor", "delta", "fen", "motors")  # the first two to report on
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 _Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
 _NAMED = 0.9
@@ -100,9 +100,9 @@ class Job:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the table of one generator."""
+    """Print the table of some generators."""
     parser = argparse.ArgumentParser(prog="scripts/bench strangers", description=__doc__)
-    parser.add_argument("--generator", choices=GENERATORS, default="fen")
+    parser.add_argument("--generators", nargs="+", choices=GENERATORS, default=GENERATORS[:2])
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--draws", type=int, default=20, help="recordings of each kind")
     parser.add_argument("--seed", type=int, default=1000)
@@ -111,16 +111,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--cases", action="store_true", help="a line for each recording")
     options = parser.parse_args(arguments)
     seeds = range(options.seed, options.seed + options.draws)
-    jobs = [Job(options.generator, kind, seed, options.folder) for seed in seeds for kind in options.kinds]
-    cases = []
+    jobs = [
+        Job(generator, kind, seed, options.folder)
+        for seed in seeds
+        for generator in options.generators
+        for kind in options.kinds
+    ]
+    cases: dict[str, list[Case]] = {generator: [] for generator in options.generators}
     with ProcessPoolExecutor(options.jobs) as pool:
         for job, case in zip(jobs, pool.map(_case, jobs), strict=True):
-            cases.append(case)
+            cases[job.generator].append(case)
             if options.cases:
-                print(f"{'ok   ' if case.right else 'WRONG'} {job.kind}-{job.seed}: {_words(case)}", flush=True)
+                print(
+                    f"{'ok   ' if case.right else 'WRONG'} {job.generator}/{job.kind}-{job.seed}: {_words(case)}",
+                    flush=True,
+                )
             elif sys.stderr.isatty():
-                print(f"\r{len(cases)} of {len(jobs)}", end="", file=sys.stderr)
-    _table(options.generator, cases)
+                print(f"\r{sum(map(len, cases.values()))} of {len(jobs)}", end="", file=sys.stderr)
+    table = Table("The critic, with exact 95 % intervals", "figure", "floor     ", *(f"{name:>24}" for name in cases))
+    for rows in zip(*map(_rows, cases.values()), strict=True):
+        table.row(*rows[0][:2], *(value for _, _, value in rows))
     return 0
 
 
@@ -186,13 +196,8 @@ def _share(hit: Callable[[Case], bool], cases: Sequence[Case]) -> str:
     return f"{k / n:.2f} ({low:.2f}-{high:.2f}) of {n}"
 
 
-def _table(generator: str, cases: Sequence[Case]) -> None:
-    table = Table(f"The critic on {generator}", "figure", "floor     ", "value, exact 95 % interval")
-    for label, floor, value in _rows(cases):
-        table.row(label, floor, value)
-
-
 def _rows(cases: Sequence[Case]) -> Iterator[tuple[str, str, str]]:
+    """Yield figures with their floors and values."""
     of = {kind: [case for case in cases if case.truth["kind"] == kind] for kind in KINDS}
     strong = {kind: [case for case in of[kind] if case.strong] for kind in KINDS}
     right = partial(_share, lambda case: case.right)
@@ -219,9 +224,8 @@ def _rows(cases: Sequence[Case]) -> Iterator[tuple[str, str, str]]:
     held = list(_covered(cases))
     yield "90 % intervals hold the truth", ".85-.95", f"{np.mean(held):.2f} of {len(held)}" if held else "-"
     gains = [case.gain for case in strong["single"] + strong["form"] if case.gain is not None]
-    if gains:
-        yield "gain on queries: median", ">= .95", f"{np.median(gains):.2f} of {len(gains)}"
-        yield "gain on queries: lowest tenth", ">= .6", f"{np.quantile(gains, 0.1):.2f}"
+    yield "gain on queries: median", ">= .95", f"{np.median(gains):.2f} of {len(gains)}" if gains else "-"
+    yield "gain on queries: lowest tenth", ">= .6", f"{np.quantile(gains, 0.1):.2f}" if gains else "-"
     yield "nulls predicted worse", "<= .05", _share(lambda case: case.worse, of["null"])
     yield "CPU [s], median and most", "", f"{np.median([c.cpu for c in cases]):.0f}, {max(c.cpu for c in cases):.0f}"
 
