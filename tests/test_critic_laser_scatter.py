@@ -24,6 +24,7 @@ from kurumaisu.critic.scatter.statistics import Statistics, _Edges, _once, _spac
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
+EVERYWHERE = (-np.inf, np.inf)  # readings that are cut off nowhere
 
 
 @dataclass(frozen=True)
@@ -202,7 +203,7 @@ def test_readings_of_something_else_pull_no_scan_away(tmp_path):
     error = 0.001 * np.random.default_rng(2).standard_normal(assembly.residual.shape)
     wild = error.copy()
     wild[:, 300:340] += 2.0
-    left = statistics._leftover(wild)[0]
+    left = statistics._leftover(wild, EVERYWHERE)[0]
     assert np.nanmedian(np.abs(np.delete(left, np.s_[300:340], axis=1))) < 1.0
     every = assembly.first.valid
     assembly.residual = np.where(every, wild, np.nan)
@@ -216,7 +217,7 @@ def test_what_errors_of_the_poses_move_is_no_reading_of_something_else(tmp_path)
     statistics = Statistics(assembly, ScanNoise(0.002, 0.005, 1e-4, 1.0))
     turned = 0.015 * np.nan_to_num(assembly.poses[:, :, 2])
     assert np.abs(turned / assembly.first.sd)[assembly.geometry].max() > 30
-    left = statistics._leftover(turned)[0]
+    left = statistics._leftover(turned, EVERYWHERE)[0]
     assert np.nanmax(np.abs(left)) < 1.5
 
 
