@@ -16,15 +16,7 @@ from kurumaisu.bench.strangers.delta.files import meta, save, tables
 from kurumaisu.bench.strangers.delta.room import furnish
 from kurumaisu.bench.strangers.delta.wrongs import options
 
-HEADER = [
-    "run",
-    "channel",
-    "t0",
-    "t1",
-    "beam",
-    "value",
-    *(f"{a}_{b}" for a in ("base", "oracle") for b in ("mean", "sd")),
-]
+HEADER = ["run", "channel", "t0", "t1", "beam", "value", "base_mean", "base_sd", "oracle_mean", "oracle_sd"]
 
 
 def make(out: Path, kind: str, seed: int) -> None:
@@ -51,9 +43,7 @@ def make(out: Path, kind: str, seed: int) -> None:
     save(out / "recording", said, drives, room.world() if setup.scans else "")
     with (out / "answers.csv").open("w", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow(
-            ["run", "channel", "t0", "t1", "beam", "value", "base_mean", "base_sd", "oracle_mean", "oracle_sd"]
-        )
+        writer.writerow(HEADER)
         for r in rows:
             writer.writerow([*r[:2], f"{r[2]:.5f}", f"{r[3]:.5f}", r[4], *(f"{u:.6f}" for u in r[5:])])
     (out / "truth.json").write_text(json.dumps(truth(case, kind, sentence), indent=1))
