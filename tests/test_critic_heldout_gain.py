@@ -24,7 +24,7 @@ from kurumaisu.critic.base.drive import prepare, split
 from kurumaisu.critic.heldout import drive_gain, scan_gain, slam_gain
 from kurumaisu.critic.heldout.slam_gain import Extension, corrected, with_scan_gain, with_slam
 from kurumaisu.critic.judge.merge import confirmed_scans, refuted, with_scans
-from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Pictures
+from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Pictures, StandIn
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.critic.values.story import Story
 from kurumaisu.critic.values.verdict import (
@@ -303,6 +303,31 @@ def test_little_evidence_must_hold_on_scans_held_out(nats, gain, told):
     assert [one.explained_by for one in left.pictures.misfits] == ["laser.scale", "laser.offset"][1 - told :]
     assert [cause.id for cause in left.causes] == ["laser.scale", "laser.offset"][1 - told :]
     assert gained == worth(left.settings)
+
+
+@pytest.mark.parametrize(
+    ("nats", "battery", "told"), [(2e3, 0.05, ["battery"]), (2e3, -0.05, ["unresolved"]), (30.0, -0.05, [])]
+)
+def test_a_curve_that_scans_held_out_refuse_gives_way_to_another_or_is_amber(nats, battery, told):
+    """By which of two quantities that change alike readings scatter, only scans held out say."""
+    time, volts = (Unknown("laser.scatter", name, "bump", 0.9) for name in ("time", "battery"))
+    first, other = (EffectSetting(f"smooth.scatter.{one.covariate}", {}) for one in (time, volts))
+    gains = {first.id: -0.1, other.id: battery}
+
+    def worth(some):
+        seen = sum(gains[one.id] for one in some)
+        return ChannelGain(LogDensityGain(0.0, seen, seen, seen - 0.01, seen + 0.01))
+
+    finding = LaserFinding(
+        unknown=(time, volts), settings=(first,), nats=nats, stand_ins=(StandIn(volts, other, first.id),)
+    )
+    left, gained = confirmed_scans(finding, worth)
+    assert [one.covariate for one in left.unknown] == told
+    assert [one.id for one in left.settings] == [other.id][: battery > 0]
+    assert (gained is not None) == (battery > 0)
+    verdict = with_scans(replace(bare(), verdict=Verdict("none")), left)
+    assert verdict.verdict.verdict == ("unknown" if told else "none")
+    assert ("do not say what: nearest is smooth.scatter.time" in verdict.story.headline) == (told == ["unresolved"])
 
 
 def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):

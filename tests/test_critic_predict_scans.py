@@ -9,6 +9,7 @@ from laser_scene import recording
 
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.predict import predictions
+from kurumaisu.critic.predict.scan import Expected, log_density
 from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.params import EffectSetting, load_model, shipped
 
@@ -119,3 +120,23 @@ def test_at_a_stop_the_scans_before_tell_how_far_the_pose_is_off(tmp_path):
     assert np.nanmedian(sds[1::2]) < 0.7 * np.nanmedian(sds[::2])
     assert (np.abs(middle) < NORMAL90).mean() == pytest.approx(0.9, abs=0.05)
     assert (np.abs(first) < NORMAL90).mean() > 0.75
+
+
+def test_readings_of_something_else_do_not_decide_how_wide_the_others_scatter():
+    """Scans off their place by far more than readings scatter, a few of which met what the map does not have."""
+    rng, shape = np.random.default_rng(1), (20, 300)
+    slopes = np.stack([np.sin(np.linspace(-2, 2, 300)), np.cos(np.linspace(-2, 2, 300)), np.ones(300)], axis=1)
+    shared = np.broadcast_to(np.column_stack([slopes, np.ones(300)]), (*shape, 4))
+    error = rng.normal(0, 0.002, shape) + (shared[:, :, :3] @ rng.normal(0, 0.01, (20, 3, 1)))[:, :, 0]
+    met = rng.random(shape) < 0.02
+    use, factors = np.ones(shape, dtype=bool), np.array([1.0, 0.01, 0.01, 1e-4])
+
+    def density(sd, error):
+        what = Expected(np.ones(shape), np.full((4, *shape), sd**2), shared, use)
+        return float(log_density(what, error, use, factors).sum())
+
+    for off in (0.03, 0.3):
+        seen = np.where(met, error + off, error)
+        assert density(0.002, seen) > density(0.003, seen) + 500
+    moved = density(0.002, np.where(met, error + 0.3, error)) - density(0.002, np.where(met, error + 3.0, error))
+    assert abs(moved) < 1e-6

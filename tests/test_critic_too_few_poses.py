@@ -8,6 +8,7 @@ from hidden_effect import USUAL, Disturbance, make_run, recording, recording_of
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge import unresolved
+from kurumaisu.critic.values.criticism import UNRESOLVED
 from kurumaisu.params import shipped
 
 SPARSE = 25  # of so many poses one is left
@@ -46,7 +47,7 @@ def test_a_quarter_too_much_is_said_of_a_dozen_poses(monkeypatch, effect, size, 
     verdict = criticism.verdict
     assert verdict.causes == ()
     assert verdict.verdict == ("none" if effect is None else "unknown")
-    assert [one.covariate for one in verdict.unknown] == ([] if effect is None else [unresolved.COVARIATE])
+    assert [one.covariate for one in verdict.unknown] == ([] if effect is None else [UNRESOLVED])
 
 
 def test_what_acts_in_the_drives_to_fit_alone_is_not_green():
@@ -55,7 +56,7 @@ def test_what_acts_in_the_drives_to_fit_alone_is_not_green():
     data = replace(recording_of("mended", drives), train=("run_1", "run_2"), test=("run_3",))
     criticism = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None)
     assert criticism.verdict.verdict == "unknown"
-    assert [one.covariate for one in criticism.verdict.unknown] == [unresolved.COVARIATE]
+    assert [one.covariate for one in criticism.verdict.unknown] == [UNRESOLVED]
     assert "base.lag_v fits the drives, but does not predict held-out ones" in criticism.story.headline
 
 

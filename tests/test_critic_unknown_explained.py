@@ -9,9 +9,9 @@ import unknown_effects as hidden
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.heldout.materiality import simulates_nearer
 from kurumaisu.critic.judge import explain_unknown
-from kurumaisu.critic.judge.unresolved import COVARIATE
 from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.search.posterior import SearchResult
+from kurumaisu.critic.values.criticism import UNRESOLVED
 from kurumaisu.critic.values.verdict import ChannelGain, Gain, LogDensityGain, RmseGain
 from kurumaisu.params import shipped
 
@@ -74,5 +74,5 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     assert (found.verdict.verdict, found.verdict.causes) == ("unknown", ())
     assert not any(setting.id.startswith("smooth") for setting in found.settings)
     assert all(one.p <= 0.5 for one in found.verdict.unknown)
-    assert (found.verdict.unknown[0].covariate == COVARIATE) is unresolved
+    assert (found.verdict.unknown[0].covariate == UNRESOLVED) is unresolved
     assert said in found.story.headline

@@ -11,8 +11,9 @@ import pytest
 
 from kurumaisu.critic.app.job import Job, criticise
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.critic.judge import explain, unresolved
+from kurumaisu.critic.judge import explain
 from kurumaisu.critic.ranges.scans.repeatability import repeatability
+from kurumaisu.critic.values.criticism import UNRESOLVED
 from kurumaisu.errors import Error
 from kurumaisu.real import by_hand, mines, sena, urg_log, warthog
 from kurumaisu.real.__main__ import main
@@ -104,7 +105,7 @@ def said_of_sena(tmp_path):
     """Return what is said of 27 intervals that turn some 5 % too far: too few to name anything, and not green."""
     found = criticise(Job(needs(sena.FOLDER / sena.LOG), tmp_path), lambda _: None)
     (unknown,) = found.verdict.unknown
-    assert (found.verdict.verdict, unknown.covariate) == ("unknown", unresolved.COVARIATE)
+    assert (found.verdict.verdict, unknown.covariate) == ("unknown", UNRESOLVED)
     assert (found.verdict.causes, found.verdict.confounded) == ((), ())
     assert "but these data do not say what it is" in found.story.headline
     return str(found.story)

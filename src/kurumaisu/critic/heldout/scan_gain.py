@@ -15,9 +15,9 @@ from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan import (
     OUTLIER,
     Expected,
-    Joint,
     ScanModel,
     expected_from,
+    log_density,
     scattered,
     shifted_hits,
     without_random,
@@ -68,12 +68,10 @@ def measure(recording: Recording, model: Model, forecast: Forecast | None, setti
         sides = [_side(split, some) for some in ((), refitted)]
         use = sides[0].counts & sides[1].counts
         for i, side in enumerate(sides):
-            joint = Joint(side.what, side.error, use)
-            density = joint.log_density(side.trained.factors)
+            density = log_density(side.what, side.error, use, side.trained.factors)
             for rows in np.array_split(np.arange(len(use)), max(len(use) // _BLOCK, 1)):
-                if use[rows].any():
-                    share = density[rows].sum() / joint.count[rows].sum()
-                    sums[i].append(np.full(int(joint.count[rows].sum()), share))
+                if count := int(use[rows].sum()):
+                    sums[i].append(np.full(count, density[rows].sum() / count))
                     squares[i].append(side.error[rows][use[rows]] ** 2)
     if not sums[0]:
         return None

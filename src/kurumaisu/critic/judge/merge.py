@@ -9,12 +9,21 @@ from operator import itemgetter
 
 from kurumaisu import effects
 from kurumaisu.critic.experiment.design import LISTED_IDS
-from kurumaisu.critic.heldout.materiality import CERTAIN, confirmed
+from kurumaisu.critic.heldout.materiality import CERTAIN, NO_NOISE, confirmed
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
-from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Pictures, Settings
-from kurumaisu.critic.values.verdict import ChannelGain, Kind, Verdict
+from kurumaisu.critic.values.criticism import (
+    UNKNOWN_CHANNEL,
+    UNRESOLVED,
+    Criticism,
+    LaserFinding,
+    Pictures,
+    Settings,
+    StandIn,
+)
+from kurumaisu.critic.values.verdict import ChannelGain, Kind, Unknown, Verdict
 
 _NOTHING_SAID = "none"
+_EITHER = 0.5  # posterior of what is unresolved
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
 _PLACES |= {"x": "x of the laser", "y": "y of the laser"}
 _POSES = {  # each against where the reference puts it: it may be wrong itself
@@ -78,7 +87,8 @@ def confirmed_scans(
 ) -> tuple[LaserFinding, ChannelGain | None]:
     """Return a finding without what scans held out refuse, or do not confirm, and what the rest is worth.
 
-    measure: returns what settings are worth. Where one of them loses it all, the others stay.
+    measure: returns what settings are worth. Where one of them loses it all, the others stay, or another curve takes
+    its place. Where nothing is left of what is beyond doubt, something else is wrong: that is unresolved.
     """
     worth = measure(finding.settings)
     if worth is None or not finding.settings:
@@ -93,10 +103,30 @@ def confirmed_scans(
         gained = measure(rest.settings)
         if gained is not None and gained.log_density_per_sample.hi90 >= 0:
             kept.append((gained.log_density_per_sample.gain, rest, gained))
+    for one in finding.stand_ins:
+        rest = _with_stand_in(refuted(finding, worth, {one.of}), finding, one)
+        gained = measure(rest.settings)
+        if confirmed(gained, finding.nats, free=True) and gained is not None:
+            kept.append((gained.log_density_per_sample.gain, rest, gained))
     if not kept:
-        return refuted(finding, worth, ids), None
+        return _unresolved(finding, refuted(finding, worth, ids)), None
     _, rest, gained = max(kept, key=itemgetter(0))
     return rest, gained
+
+
+def _with_stand_in(rest: LaserFinding, before: LaserFinding, one: StandIn) -> LaserFinding:
+    """Return a finding without a curve, told with another in its place."""
+    others = (each for each in before.unknown if each.channel != one.unknown.channel)
+    return replace(rest, unknown=(one.unknown, *others), settings=(*rest.settings, one.setting))
+
+
+def _unresolved(before: LaserFinding, left: LaserFinding) -> LaserFinding:
+    """Return what is left of a finding, amber where neither chance nor the map can have made what was refused."""
+    if before.nats < NO_NOISE:
+        return left
+    gone = ", ".join(setting.id for setting in before.settings)
+    shape = f"nearest is {gone}, which held-out scans refuse"
+    return replace(left, unknown=(*left.unknown, Unknown(UNKNOWN_CHANNEL, UNRESOLVED, shape, _EITHER)))
 
 
 def _without_faint(
@@ -180,6 +210,8 @@ def headline(finding: LaserFinding) -> str:
     """Return what the scans say in a sentence; empty when they say nothing."""
     if finding.unknown:
         first = finding.unknown[0]
+        if first.covariate == UNRESOLVED:
+            return f"Something is wrong with the readings, and these scans do not say what: {first.shape}."
         over = _PLACES.get(first.covariate, first.covariate)
         of = _POSES.get(first.channel, "the ranges")
         return f"No effect in the catalogue explains the error of {of}. It follows the {over}: {first.shape}."

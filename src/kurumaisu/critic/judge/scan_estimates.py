@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
@@ -16,8 +17,8 @@ from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.shapes import grid, shape_of
-from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER
-from kurumaisu.critic.values.policy import NAMED
+from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER, StandIn
+from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate, Unknown
 from kurumaisu.effects import Echoes
 from kurumaisu.params import EffectSetting
@@ -181,6 +182,18 @@ def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:
     for one in curves[:_LISTED]:
         curve = ReadingCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
         yield Unknown(UNKNOWN_SCATTER, _called(one.basis), f"of the noise: {shape(curve, '%')}", one.p)
+
+
+def stand_ins(curves: Sequence[ScatterCurve]) -> Iterator[StandIn]:
+    """Yield curves of the noise that fit nearly as well as the likeliest: no curve is of the very form of what acts.
+
+    Each with its posterior were those before it none.
+    """
+    for i, one in enumerate(curves):
+        if i and one.nats > (1 - FORM_ERROR) * curves[0].nats:
+            p = float(np.exp(one.nats - logsumexp([0.0, *(other.nats for other in curves[i:])])))
+            (unknown,) = unknown_scatter([replace(one, p=p)])
+            yield StandIn(unknown, one.setting, curves[0].setting.id)
 
 
 def _called(basis: Basis) -> str:

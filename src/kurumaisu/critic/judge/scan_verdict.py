@@ -15,6 +15,7 @@ from kurumaisu.critic.judge.scan_estimates import (
     another_map,
     estimates_of,
     of_block,
+    stand_ins,
     unknown_scatter,
     unknowns,
     with_scatter,
@@ -245,7 +246,8 @@ def _finding(
     causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added})
     confounded += tuple(group for group in map(open_set, scatter.effects) if group)
     added += tuple(each.setting for each in scatter.curves[:1])
-    return LaserFinding(causes, confounded, unknown, added, details, small=small)
+    nats, others = max((one.nats for one in scatter.curves), default=0.0), tuple(stand_ins(scatter.curves))
+    return LaserFinding(causes, confounded, unknown, added, details, small=small, nats=nats, stand_ins=others)
 
 
 def _confused(assembly: Assembly, normal: NormalEquations, made: MeanEffects, causes: Sequence[Cause]) -> Groups:

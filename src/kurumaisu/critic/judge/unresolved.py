@@ -24,14 +24,13 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.intermittent import Intermittent, intermittent
-from kurumaisu.critic.values.criticism import Criticism
+from kurumaisu.critic.values.criticism import UNRESOLVED, Criticism
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.critic.values.story import Misfit, bins
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
-COVARIATE = "unresolved"
 _P = 0.5  # that any cause that could be told is it
 _LEAST = 5.0  # [nat] of evidence for what cannot be named
 _FAR = 0.02  # share of the way or turn that it moves the chair
@@ -81,7 +80,7 @@ def with_unresolved(
 def with_remainder(criticism: Criticism) -> Criticism:
     """Return a criticism that says so where with all that was found held-out motion is far from what noise allows."""
     gain = criticism.verdict.gain
-    said = criticism.verdict.verdict == "none" or any(one.covariate == COVARIATE for one in criticism.verdict.unknown)
+    said = criticism.verdict.verdict == "none" or any(one.covariate == UNRESOLVED for one in criticism.verdict.unknown)
     if said or gain is None or not gain.rmse:
         return criticism
     name, path = next(iter(gain.rmse.items()))  # over the shortest horizon
@@ -122,7 +121,7 @@ def with_intermittent(criticism: Criticism, one: Intermittent | None) -> Critici
     p = float(expit(one.nats + np.log(UNKNOWN_ODDS)))
     unknown = Unknown(f"base.{effects.CHANNELS[one.channel].rate}", "time", shape, p)
     before = criticism.verdict
-    others = tuple(other for other in before.unknown if other.covariate != COVARIATE)
+    others = tuple(other for other in before.unknown if other.covariate != UNRESOLVED)
     alone = before.verdict == "none"
     verdict = replace(before, verdict="unknown", unknown=(unknown, *others), gain=None if alone else before.gain)
     story = replace(
@@ -189,6 +188,6 @@ def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
 
 
 def _amber(criticism: Criticism, shape: str, words: str) -> Criticism:
-    unknown = Unknown("base", COVARIATE, shape, _P)
+    unknown = Unknown("base", UNRESOLVED, shape, _P)
     verdict = replace(criticism.verdict, verdict="unknown", unknown=(unknown,))
     return replace(criticism, verdict=verdict, story=replace(criticism.story, headline=words))

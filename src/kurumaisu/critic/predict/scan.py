@@ -24,6 +24,8 @@ _DRAWS, _LOOKS = (16, 128), 4096  # so many of each scan, at least and at most, 
 OUTLIER = 5.0  # deviations from which a reading does not say how wide the others scatter
 _PROBE = 2  # scans on which it is tried what is drawn
 _CAP = 6.0  # deviations that an outlier counts as
+_ELSEWHERE = float(np.log(0.01 / 4.0))  # log density [nat] of what one reading in a hundred is, anywhere in 4 m
+_ROUNDS = 2  # in which it is told which readings those are
 _FEWEST = 50  # readings
 _LEAST = 1e-4  # [m]
 _SURE = 1e-5  # [m, rad] no pose is known better
@@ -156,7 +158,7 @@ def scattered(what: Expected, measured: FloatArray, settings: tuple[EffectSettin
         near = inside & (np.abs(np.nan_to_num(z)) < OUTLIER * SIGMA_PER_MAD * max(middle, 0.1))
         if near.sum() < _FEWEST:
             break
-        factors = _factors(Joint(what, error, near), start, np.array(_SPREAD))
+        factors = _factors(Joint(what, error, _no_outliers(what, error, near, factors)), start, np.array(_SPREAD))
     z = error / ScanModel(settings, factors, (1.0, 1.0)).of(what)[1]
     return ScanModel(settings, factors, (_tail(z[inside]), _tail(z[~what.place & np.isfinite(z)])))
 
@@ -169,21 +171,49 @@ class Joint:
         own = np.where(use, what.parts[0], np.inf)
         left = np.where(use, np.nan_to_num(error), 0.0)
         weighed = what.shared / own[:, :, np.newaxis]
-        self.count = use.sum(axis=1)
+        self._count = use.sum(axis=1)
+        self._shared = what.shared
         self._inner = weighed.transpose(0, 2, 1) @ what.shared
         self._cross = (weighed.transpose(0, 2, 1) @ left[:, :, np.newaxis])[:, :, 0]
         self._square = np.sum(left**2 / own, axis=1)
         self._log = np.sum(np.log(np.where(use, own, 1.0)), axis=1)
 
+    def common(self, factors: FloatArray) -> FloatArray:
+        """Return what each scan's shared errors most likely do to its readings, (k, b) [m]."""
+        size, inner, cross = self._solved(factors)
+        shared = np.linalg.solve(inner, cross[:, :, np.newaxis])
+        return np.asarray((self._shared @ (size[:, np.newaxis] * shared))[:, :, 0])
+
+    def _solved(self, factors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        size = factors[[1, 1, 2, 3]] / factors[0]
+        return size, np.eye(4) + self._inner * np.outer(size, size), self._cross * size
+
     def log_density(self, factors: FloatArray) -> FloatArray:
         """Return the log density of each scan's readings together, (k,) [nat]; factors (4,) as of ScanModel."""
         k = factors[0]
-        size = factors[[1, 1, 2, 3]] / k
-        inner = np.eye(4) + self._inner * np.outer(size, size)
-        cross = self._cross * size
+        _, inner, cross = self._solved(factors)
         rest = self._square - np.sum(cross * np.linalg.solve(inner, cross[:, :, np.newaxis])[:, :, 0], axis=1)
-        log_det = self._log + 2 * self.count * np.log(k) + np.linalg.slogdet(inner)[1]
-        return np.asarray(-0.5 * (rest / k**2 + log_det + self.count * np.log(2 * np.pi)))
+        log_det = self._log + 2 * self._count * np.log(k) + np.linalg.slogdet(inner)[1]
+        return np.asarray(-0.5 * (rest / k**2 + log_det + self._count * np.log(2 * np.pi)))
+
+
+def _no_outliers(what: Expected, error: FloatArray, use: BoolArray, factors: FloatArray) -> BoolArray:
+    """Return which of the readings (k, b) that count are no outliers beside what their scans share."""
+    own, near = np.maximum(factors[0] * np.sqrt(what.parts[0]), _LEAST), use
+    for _ in range(_ROUNDS):
+        z = np.abs(np.where(use, error - Joint(what, error, near).common(factors), 0.0)) / own
+        middle = float(np.median(z[near])) if near.any() else 1.0
+        near = use & (z < OUTLIER * SIGMA_PER_MAD * max(middle, 0.1))
+    return near
+
+
+def log_density(what: Expected, error: FloatArray, use: BoolArray, factors: FloatArray) -> FloatArray:
+    """Return the log density of each scan's readings that count, (k,) [nat]; outliers may be anywhere.
+
+    Beside what a whole scan shares, the noise of a reading is small: else a few that met something else decide all.
+    """
+    near = _no_outliers(what, error, use, factors)
+    return np.asarray(Joint(what, error, near).log_density(factors) + _ELSEWHERE * (use & ~near).sum(axis=1))
 
 
 def _factors(joint: Joint, start: FloatArray, spread: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _SIMULATED = 0.5  # variance of the numbers of simulations, of which two are averaged, in theirs
 _COUNT = 1.0  # sd of twice the root of a count, also of one that is always 0 in simulations
-_MATTERS = 0.02  # of any other number, a log of a square or a correlation, by which it may differ and matter to nobody
+MATTERS = 0.02  # of any other number, the log of a square, by which it may differ and matter to nobody
 # Share of twice the root of a count likewise: a spread that differs by so little has a tenth more or less beyond 3 sds.
 _TAILS = 0.05
 _OWN = 0.1  # share of the variance of numbers that share readings which each has to itself
@@ -33,7 +33,8 @@ class StatisticKinds:
 
     trends (g, m): from -1 to 1 over numbers of readings from near to far, or from straight to oblique; 0 elsewhere.
     folds (m,): logs of the ranges at which numbers tell how far readings scatter, less their mean; 0 elsewhere.
-    alike (m, m): correlations by the readings that numbers share, whatever these do.
+    alike (m, m): correlations by the readings that numbers share, whatever these do. matters (m,): by how much those
+    that are no counts may differ and matter to nobody.
     """
 
     counts: BoolArray
@@ -41,6 +42,7 @@ class StatisticKinds:
     trends: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
     folds: FloatArray = field(default_factory=lambda: np.empty(0))
     alike: FloatArray | None = None
+    matters: FloatArray | float = MATTERS
 
 
 class StatisticsLikelihood:
@@ -55,7 +57,7 @@ class StatisticsLikelihood:
         self.offset, self.measured = nulls.mean(axis=0), measured
         spread = nulls.std(axis=0)
         count_sd = np.hypot(np.maximum(spread, _COUNT), _TAILS * np.abs(self.offset))
-        self.sd = np.where(kinds.counts, count_sd, np.hypot(spread, _MATTERS))
+        self.sd = np.where(kinds.counts, count_sd, np.hypot(spread, kinds.matters))
         self.sd = np.where(heard, self.sd, _SILENT)
         unit = (nulls - self.offset) / self.sd
         own = np.eye(len(measured))

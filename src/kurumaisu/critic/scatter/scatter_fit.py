@@ -16,6 +16,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.scatter.likelihood import StatisticsLikelihood
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.values.policy import Z_LOW
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -23,6 +24,7 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
+_SMALLEST = 0.06  # likewise: from there on they are halved until nobody would see them
 _HALVED = 12  # times that the way between two of these is halved at most, where readings pile up between them
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
@@ -98,6 +100,7 @@ class ScatterFit:
         self._simulate, self._means = simulate, set(means)
         self._known: dict[tuple[object, ...], FloatArray] = {}
         self._shapes: set[tuple[str, str]] = set()
+        self._tried: dict[tuple[str, str], list[float]] = {}
         self.likeness = StatisticsLikelihood(
             nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
         )
@@ -118,12 +121,18 @@ class ScatterFit:
             for p in self._parameters(effect):
                 found: list[StatisticsChange] = []
                 least = 0.0
-                for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
+                sizes = sorted(_sizes(p), key=lambda value: -abs(value - p.null))
+                while sizes:
+                    value = sizes.pop(0)
                     moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     if np.array_equal(moved, plain):
                         least = value
                         break  # it only shapes what others do, or does nothing when it is smaller
                     found.append(StatisticsChange(effect, form, p.name, value, moved - plain))
+                    seen = float(np.linalg.norm(self.likeness.whitened(moved - plain, plain)))
+                    if seen > Z_LOW and abs(value - p.null) < _SMALLEST * p.scale:
+                        sizes.append(p.null + (value - p.null) / 2)
+                self._tried[effect.id, p.name] = [push.value for push in found]
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
@@ -243,7 +252,9 @@ class ScatterFit:
     ) -> tuple[ScatterPiece, float]:
         """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
         name, values = piece.setting.id, piece.setting.parameters
-        tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
+        tried = [
+            EffectSetting(name, {**values, p.name: value}) for value in self._tried.get((name, p.name)) or _sizes(p)
+        ]
         misfits = [self.misfit((*beside, each)) for each in tried]
         more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
         if min(misfits) < low - _FREE:

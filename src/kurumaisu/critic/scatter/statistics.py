@@ -14,7 +14,7 @@ from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
 from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_offs, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.scatter.likelihood import StatisticKinds
+from kurumaisu.critic.scatter.likelihood import MATTERS, StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -57,13 +57,14 @@ class Groups:
 class Statistic:
     """A number: what a reader calls it, whether it is the root of a count, and whether it follows readings' errors.
 
-    group: of the readings that it is of, None of all.
+    group: of the readings that it is of, None of all. matters: by how much it may differ and matter to nobody.
     """
 
     name: str
     count: bool
     off: bool
     group: int | None = None
+    matters: float = MATTERS
 
 
 class Statistics:
@@ -143,7 +144,8 @@ class Statistics:
         places = np.arange(len(counts)) >= len(counts) - _PLACES
         folds = self._groups.folds
         folds = np.asarray(np.r_[folds, np.zeros(len(counts) - len(folds))])
-        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), folds, self._alike())
+        matters = np.array([one.matters for one in self._told()])
+        return StatisticKinds(counts, places, _trends(self._told(), self._groups.kinds), folds, self._alike(), matters)
 
     def _alike(self) -> FloatArray:
         """Return correlations of the numbers (m, m): one reading that is missing is so in all groups it belongs to."""
@@ -164,7 +166,11 @@ class Statistics:
         groups = list(enumerate(self._groups.names))
         return [
             *(Statistic(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
-            *(Statistic(f"correlation of beams {lag} apart", count=False, off=True) for lag in (1, 2, 4)),
+            # Neighbours that share so much scatter their sum by twice as much, as a share of its square.
+            *(
+                Statistic(f"correlation of beams {lag} apart", count=False, off=True, matters=MATTERS / 2)
+                for lag in (1, 2, 4)
+            ),
             *(
                 Statistic(f"readings more than {far:g} sd off", count=True, off=True)
                 for far in (3, 4.5, _FAR, ELSEWHERE)

@@ -13,6 +13,7 @@ from kurumaisu.types import FloatArray
 
 Settings = tuple[EffectSetting, ...]
 Progress = Callable[[str], None]
+UNRESOLVED = "unresolved"  # the covariate of what surely is wrong, where the data do not say what it follows
 UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue, of the mean of readings
 UNKNOWN_SCATTER = "laser.scatter"  # and of how they scatter
 # Of x, y and heading of where scans put the laser, against the reference, with the unit of a thousandth.
@@ -57,13 +58,23 @@ class Pictures:
 
 
 @dataclass(frozen=True)
+class StandIn:
+    """A curve that fits nearly as well as the one that is told: what would be told, its setting, and that one's id."""
+
+    unknown: Unknown
+    setting: EffectSetting
+    of: str
+
+
+@dataclass(frozen=True)
 class LaserFinding:
     """What the scans say.
 
     causes: named and material; confounded: sets of which one acts; unknown: what is in no catalogue; settings: what
     extends the model; details, pictures: for the report; small: certain, but they do not matter; refused: why there
     is no laser criticism, None where there is; next_experiment: what supplies what the scans lack; wrong: what must be
-    mended before anything is said, None where nothing must.
+    mended before anything is said, None where nothing must; nats: log evidence of a curve of the scatter, which no
+    error of the map makes; stand_ins: of that curve.
     """
 
     causes: tuple[Cause, ...] = ()
@@ -76,3 +87,5 @@ class LaserFinding:
     refused: str | None = None
     next_experiment: NextExperiment | None = None
     wrong: str | None = None
+    nats: float = 0.0
+    stand_ins: tuple[StandIn, ...] = ()
