@@ -211,25 +211,6 @@ class ScatterFit:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
         return RoughFit(low, pushes[0].effect, pushes[0].form, best)
 
-    def halves(
-        self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
-    ) -> tuple[ScatterPiece, float]:
-        """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
-
-        Each begins with half of its power.
-        """
-        pair = []
-        for one in (piece, rival):
-            sizes = {
-                p.name: p.null + np.sqrt(0.5) * (one.setting.parameters[p.name] - p.null)
-                for p in one.effect.parameters
-                if p.name in one.free
-            }
-            values = {**one.setting.parameters, **sizes}
-            pair.append(replace(one, setting=EffectSetting(one.setting.id, values)))
-        (_, new), misfit = self.together(pair, beside)
-        return new, misfit
-
     def plain(self, start: RoughFit) -> ScatterPiece:
         """Return an effect of such sizes, nothing fitted yet."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
@@ -238,9 +219,13 @@ class ScatterFit:
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         (piece,), low = self.together([self.plain(start)], beside)
+        return self.bent(piece, low, beside)
+
+    def bent(self, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
+        """Return an effect of a misfit with those further parameters fitted that help, and its misfit then."""
         for _ in range(_PASSES):
             known = piece.free
-            for p in self._parameters(start.effect):
+            for p in self._parameters(piece.effect):
                 if p.name not in piece.free and low > _POOR:
                     piece, low = self._with(p, piece, low, beside)
             if piece.free == known:
