@@ -327,7 +327,7 @@ def test_a_curve_that_scans_held_out_refuse_gives_way_to_another_or_is_amber(nat
     assert (gained is not None) == (battery > 0)
     verdict = with_scans(replace(bare(), verdict=Verdict("none")), left)
     assert verdict.verdict.verdict == ("unknown" if told else "none")
-    assert ("do not say what: nearest is smooth.scatter.time" in verdict.story.headline) == (told == ["unresolved"])
+    assert ("do not say by what: nearest is smooth.scatter.time" in verdict.story.headline) == (told == ["unresolved"])
 
 
 def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):

@@ -12,7 +12,7 @@ from kurumaisu.critic.experiment.design import LISTED_IDS
 from kurumaisu.critic.heldout.materiality import CERTAIN, NO_NOISE, confirmed
 from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import (
-    UNKNOWN_CHANNEL,
+    UNKNOWN_SCATTER,
     UNRESOLVED,
     Criticism,
     LaserFinding,
@@ -126,7 +126,7 @@ def _unresolved(before: LaserFinding, left: LaserFinding) -> LaserFinding:
         return left
     gone = ", ".join(setting.id for setting in before.settings)
     shape = f"nearest is {gone}, which held-out scans refuse"
-    return replace(left, unknown=(*left.unknown, Unknown(UNKNOWN_CHANNEL, UNRESOLVED, shape, _EITHER)))
+    return replace(left, unknown=(*left.unknown, Unknown(UNKNOWN_SCATTER, UNRESOLVED, shape, _EITHER)))
 
 
 def _without_faint(
@@ -211,7 +211,7 @@ def headline(finding: LaserFinding) -> str:
     if finding.unknown:
         first = finding.unknown[0]
         if first.covariate == UNRESOLVED:
-            return f"Something is wrong with the readings, and these scans do not say what: {first.shape}."
+            return f"Readings scatter otherwise than in the model, and these scans do not say by what: {first.shape}."
         over = _PLACES.get(first.covariate, first.covariate)
         of = _POSES.get(first.channel, "the ranges")
         return f"No effect in the catalogue explains the error of {of}. It follows the {over}: {first.shape}."
