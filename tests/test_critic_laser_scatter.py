@@ -312,6 +312,26 @@ def test_a_probability_is_that_in_the_company_found_last():
     assert {piece.setting.id for piece in search._certain(pieces)} == {setting.id for setting in truth}
 
 
+def test_what_bent_before_its_company_was_known_begins_anew():
+    """Lost oblique beams did what noise does: beside the noise they are lost anywhere."""
+    simulate = _Linear(
+        {
+            "laser.dropout.probability": (9.0, 9.0, 0.0, 0.0, 0.0),
+            "laser.dropout.oblique": (0.0, -2.0, 4.0, 4.0, 0.0),
+            "laser.incidence_noise.gain": (0.0, 0.0, 4.0, 4.0, 0.0),
+        }
+    )
+    truth = [at("laser.dropout", probability=0.05), at("laser.incidence_noise", gain=0.5)]
+    fit = ScatterFit(simulate, simulate(truth, 5), (), frozenset(each.id for each in truth))
+    bent = at("laser.dropout", probability=0.03, oblique=0.1)
+    pieces = _pieces((bent, ("probability", "oblique"), 90.0), (truth[1], ("gain",), 60.0))
+    lost, noise = ScatterSearch(fit)._straightened(list(fit.pushes()), pieces)
+    assert lost.free == ("probability",)
+    assert lost.setting.parameters["oblique"] == 0.0
+    assert lost.setting.parameters["probability"] == pytest.approx(0.05, rel=0.1)
+    assert noise is pieces[1]
+
+
 @pytest.mark.parametrize("grid", [0.001, 0.012])
 def test_scans_of_one_stand_on_a_coarse_grid_say_less_than_as_many_independent_ones(grid):
     scans, beams, noise = 20, 4000, 0.0025

@@ -16,7 +16,6 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.scatter.likelihood import StatisticsLikelihood
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
-from kurumaisu.critic.values.policy import Z_LOW
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -24,7 +23,6 @@ from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 _SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
-_SMALLEST = 0.06  # likewise: from there on they are halved until nobody would see them
 _HALVED = 12  # times that the way between two of these is halved at most, where readings pile up between them
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
@@ -100,7 +98,6 @@ class ScatterFit:
         self._simulate, self._means = simulate, set(means)
         self._known: dict[tuple[object, ...], FloatArray] = {}
         self._shapes: set[tuple[str, str]] = set()
-        self._tried: dict[tuple[str, str], list[float]] = {}
         self.likeness = StatisticsLikelihood(
             nulls, measured, simulate.kinds(), np.ones(len(measured), dtype=bool) if heard is None else heard
         )
@@ -121,18 +118,12 @@ class ScatterFit:
             for p in self._parameters(effect):
                 found: list[StatisticsChange] = []
                 least = 0.0
-                sizes = sorted(_sizes(p), key=lambda value: -abs(value - p.null))
-                while sizes:
-                    value = sizes.pop(0)
+                for value in sorted(_sizes(p), key=lambda value: -abs(value - p.null)):
                     moved = self._numbers((EffectSetting(effect.id, {**null, p.name: value}),), 1)
                     if np.array_equal(moved, plain):
                         least = value
                         break  # it only shapes what others do, or does nothing when it is smaller
                     found.append(StatisticsChange(effect, form, p.name, value, moved - plain))
-                    seen = float(np.linalg.norm(self.likeness.whitened(moved - plain, plain)))
-                    if seen > Z_LOW and abs(value - p.null) < _SMALLEST * p.scale:
-                        sizes.append(p.null + (value - p.null) / 2)
-                self._tried[effect.id, p.name] = [push.value for push in found]
                 if not found:
                     self._shapes.add((effect.id, p.name))
                 yield from reversed(found)
@@ -211,6 +202,25 @@ class ScatterFit:
                     low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
         return RoughFit(low, pushes[0].effect, pushes[0].form, best)
 
+    def halves(
+        self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
+        """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
+
+        Each begins with half of its power.
+        """
+        pair = []
+        for one in (piece, rival):
+            sizes = {
+                p.name: p.null + np.sqrt(0.5) * (one.setting.parameters[p.name] - p.null)
+                for p in one.effect.parameters
+                if p.name in one.free
+            }
+            values = {**one.setting.parameters, **sizes}
+            pair.append(replace(one, setting=EffectSetting(one.setting.id, values)))
+        (_, new), misfit = self.together(pair, beside)
+        return new, misfit
+
     def plain(self, start: RoughFit) -> ScatterPiece:
         """Return an effect of such sizes, nothing fitted yet."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
@@ -219,13 +229,9 @@ class ScatterFit:
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         (piece,), low = self.together([self.plain(start)], beside)
-        return self.bent(piece, low, beside)
-
-    def bent(self, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
-        """Return an effect of a misfit with those further parameters fitted that help, and its misfit then."""
         for _ in range(_PASSES):
             known = piece.free
-            for p in self._parameters(piece.effect):
+            for p in self._parameters(start.effect):
                 if p.name not in piece.free and low > _POOR:
                     piece, low = self._with(p, piece, low, beside)
             if piece.free == known:
@@ -237,9 +243,7 @@ class ScatterFit:
     ) -> tuple[ScatterPiece, float]:
         """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
         name, values = piece.setting.id, piece.setting.parameters
-        tried = [
-            EffectSetting(name, {**values, p.name: value}) for value in self._tried.get((name, p.name)) or _sizes(p)
-        ]
+        tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
         misfits = [self.misfit((*beside, each)) for each in tried]
         more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
         if min(misfits) < low - _FREE:

@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from operator import attrgetter, itemgetter
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
@@ -85,10 +84,9 @@ class ScatterSearch:
         gone: set[type[Mechanism]] = set()
         while len(chosen) < _LARGEST:
             new = self._step(pushes, chosen, gone)
-            if not new or new[0].nats < self._least(chosen, new[0]):
+            if new is None or new.nats < self._least(chosen, new):
                 break
-            for one in new:
-                chosen = self._settled(pushes, chosen, one, gone)
+            chosen = self._straightened(pushes, self._settled(pushes, chosen, new, gone))
         chosen = self._certain(self._polished(chosen))
         settings = [piece.setting for piece in chosen]
         return [
@@ -119,8 +117,8 @@ class ScatterSearch:
 
     def _step(
         self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece], gone: set[type[Mechanism]]
-    ) -> list[ScatterPiece]:
-        """Return the effect to add, or two that explain more than it does; none where there is too little."""
+    ) -> ScatterPiece | None:
+        """Return the effect to add; None where there is too little."""
         beside = [piece.setting for piece in chosen]
         at = self._fit.statistics(beside, (1, 2))
         here = self._likeness.cost(at)
@@ -137,38 +135,43 @@ class ScatterSearch:
             piece, misfit = self._fit.alone(start, beside)
             tried.append(_valued(piece, here - misfit))
         best = _weighed(tried) if tried else None
-        if best is not None and best.nats >= 0:
-            best = _weighed([best, *best.rivals], self._heat([*beside, best.setting]))
-        left = at if best is None else self._fit.statistics([*beside, best.setting], (1, 2))
-        bent = best is None or best.price > 0 or self._off(left)
-        pair = self._pair(pushes, without, beside) if bent and self._off(at) else []
-        if min((one.nats for one in pair), default=0.0) >= self._enough:
-            return _or_pair(best, pair)
-        return [best] if best is not None and best.nats >= 0 else []
+        if (best is None or best.nats < self._least(chosen, best)) and self._off(at):
+            tried = [*tried, *self._halved(chosen, without, here)]
+            best = _weighed([max(same, key=_nats) for same in _by_effect(tried)]) if tried else None
+        if best is None or best.nats < 0:
+            return None
+        return _weighed([best, *best.rivals], self._heat([*beside, best.setting]))
 
-    def _pair(
-        self, pushes: Sequence[StatisticsChange], without: set[type[Mechanism]], beside: Sequence[EffectSetting]
-    ) -> list[ScatterPiece]:
-        """Return the two effects that do best together, each the better one with what it is worth alone.
+    def _halved(
+        self, chosen: Sequence[ScatterPiece], without: set[type[Mechanism]], here: float
+    ) -> Iterator[ScatterPiece]:
+        """Yield rivals of the chosen effects, each fitted together with the one that was taken for it.
 
-        One effect of many parameters may do nearly what two of few do. Of two alike, each alone does nearly all.
+        Of two that act, each alone explains nearly all, and the other one added to that much of it then nothing.
         """
-        at = self._fit.statistics(beside, (1, 2))
-        free = [push for push in pushes if push.effect not in without]
-        both = ((one, other) for one, other in combinations(free, 2) if one.effect is not other.effect)
-        pair = min(both, key=lambda two: self._likeness.cost(at + two[0].change + two[1].change), default=())
-        starts = [RoughFit(0.0, push.effect, push.form, {push.name: push.value}) for push in pair]
-        if not starts:
-            return []
-        pieces, low = self._fit.together([self._fit.plain(start) for start in starts], beside)
-        for i, own in enumerate(pieces):
-            pieces[i], low = self._fit.bent(own, low, [*beside, pieces[1 - i].setting])
-        first, second = pieces
-        alone = [self._fit.together([one], beside)[1] for one in pieces]
-        if alone[0] < alone[1]:
-            first, second, alone = second, first, alone[::-1]
-        here = self._likeness.cost(at)
-        return [_valued(second, here - alone[1]), _valued(first, alone[1] - low)]
+        for piece in chosen:
+            beside = [other.setting for other in chosen if other is not piece]
+            for rival in piece.rivals:
+                if rival.effect not in without and self._fit.overlap(piece, rival) > _OVERLAP:
+                    new, misfit = self._fit.halves(piece, rival, beside)
+                    yield _valued(new, here - misfit)
+
+    def _straightened(self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
+        """Return the pieces, those of several parameters begun anew with the plainest where that is better.
+
+        Before the others were known, its further parameters may have bent to do what they do: beams that are lost where
+        they meet walls obliquely, say, hide that these are read noisily. No small step leads back from there.
+        """
+        out = list(chosen)
+        for i, old in enumerate(chosen):
+            beside = [piece.setting for piece in out if piece.effect is not old.effect]
+            if len(old.free) < 2 or not beside:
+                continue
+            plain = self._fit.plain(self._begun(pushes, old, beside))
+            (new,), cost = self._fit.together([plain], beside)
+            if cost + new.price < self._fit.misfit([*beside, old.setting]) + old.price:
+                out[i] = replace(old, setting=new.setting, free=new.free)
+        return out
 
     def _begun(
         self, pushes: Sequence[StatisticsChange], piece: ScatterPiece, beside: Sequence[EffectSetting]
@@ -285,18 +288,6 @@ def _valued(piece: ScatterPiece, gain: float) -> ScatterPiece:
     count, z = len(effects.LASER), np.sqrt(max(2 * gain, 0.0))
     cost = float(occam(np.array(z))) + piece.price
     return replace(piece, nats=gain - cost + log_prior(1, count) - log_prior(0, count))
-
-
-def _or_pair(best: ScatterPiece | None, pair: Sequence[ScatterPiece]) -> list[ScatterPiece]:
-    """Return the likelier of an effect and of two, which then are rivals of it, and it of them."""
-    singles = () if best is None else (best, *best.rivals)
-    share = float(expit(sum(one.nats for one in pair) - max([0.0, *(one.nats for one in singles[:1])])))
-    two = [replace(one, p=share) for one in pair]
-    others = [one for one in singles if all(one.effect is not each.effect for each in pair)]
-    if best is None or share > 0.5:
-        rivals = tuple(replace(one, p=(1 - share) * one.p) for one in others)
-        return [replace(one, rivals=rivals) for one in two]
-    return [replace(best, p=best.p * (1 - share), rivals=(*best.rivals, *two))] if best in others else [best]
 
 
 def _weighed(tried: Sequence[ScatterPiece], heat: float = 1.0, doubt: float = 1.0) -> ScatterPiece:
