@@ -9,7 +9,7 @@ from kurumaisu.bench.strangers.delta.answers import ask
 from kurumaisu.bench.strangers.delta.camera import record
 from kurumaisu.bench.strangers.delta.catalogue import ALL, BASE, LASER, draw, possible, unknowns
 from kurumaisu.bench.strangers.delta.circumstances import CONFOUNDED, columns
-from kurumaisu.bench.strangers.delta.core import Cause, Drive, Fan, Noise, Setup
+from kurumaisu.bench.strangers.delta.core import WARM, Cause, Drive, Fan, Noise, Setup
 from kurumaisu.bench.strangers.delta.drives import drive_it
 from kurumaisu.bench.strangers.delta.room import furnish
 from kurumaisu.bench.strangers.delta.scanner import scan
@@ -200,7 +200,7 @@ def confounded(rng: np.random.Generator) -> Case | None:
     setup.style, setup.facts["soft"] = style, {"slow": 0.12, "lab": 1.0}.get(style, 50.0)
     cause = draw(rng, name, False)
     if "temperature" in "".join([name, *rivals]):
-        tau, rise = cause.extra.get("tau", 500.0), float(rng.uniform(3, 6))
+        tau, rise = cause.extra.get("tau", WARM), float(rng.uniform(3, 6))
         cause.extra.update({"tau": tau} if name == "laser.warmup" else {})
         setup.columns["temperature"] = lambda s: 20 + rise * (1 - np.exp(-s / tau))
     drive_all(setup, [], dry=True)

@@ -12,6 +12,7 @@ from kurumaisu.bench.strangers.delta.room import Room
 
 Array = NDArray[Any]
 DT = 0.01
+WARM = 500.0  # [s] in which a laser, or what is about it, gets warm where nothing else is said
 
 
 @dataclass

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from kurumaisu.bench.strangers.delta.core import Array, Cause, Drive, Setup
+from kurumaisu.bench.strangers.delta.core import WARM, Array, Cause, Drive, Setup
 from kurumaisu.bench.strangers.delta.room import Hits
 
 Bias = Callable[[Setup, Drive, Hits, Cause], Array]
@@ -20,7 +20,7 @@ def tangent(h: Hits) -> Array:
 def warming(setup: Setup, drive: Drive, h: Hits, c: Cause) -> Array:
     """Drift since the laser was switched on, at the session's start; other: a body of two heat capacities."""
     t = drive.session + h.t
-    tau = c.extra["tau"]
+    tau = c.extra.get("tau", WARM)
     one = np.exp(-t / tau)
     return np.asarray(
         c.size * (1 - (0.5 * np.exp(-t / (0.25 * tau)) + 0.5 * np.exp(-t / (3 * tau)) if c.other else one))
