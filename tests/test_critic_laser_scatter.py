@@ -358,3 +358,14 @@ def test_the_step_of_a_grid_is_known_whatever_is_read_of_something_else(step):
     readings[::77] = np.nan
     assert _spacing(readings) == pytest.approx(step, rel=0.01)
     assert _spacing(np.full(3, np.nan)) == 0.001
+
+
+@pytest.mark.parametrize(("rho", "told"), [(0.07, ["laser.beam_correlation"]), (0.0, [])])
+def test_neighbours_that_share_little_are_told_where_readings_are_many(tmp_path, rho, told):
+    """Of a fourteenth that each beam shares with the next, sums of readings scatter by a seventh more."""
+    finding = criticise_scans(recording(tmp_path, "laser.beam_correlation", rho, 5, scans=40), MODEL, lambda _: None)
+    assert [cause.id for cause in finding.causes] == told
+    assert not finding.confounded
+    if told:
+        rho_told = finding.causes[0].parameters["rho"]
+        assert rho_told.lo90 < rho < rho_told.hi90
