@@ -4,7 +4,9 @@
 import io
 import json
 import math
+import threading
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
 from kurumaisu.params import load_model, shipped
+from kurumaisu.ros.viewer import source
 from kurumaisu.ros.viewer.maps import Maps
 from kurumaisu.ros.viewer.robot import Robot
 from kurumaisu.ros.viewer.topics import PlanarTransforms
@@ -232,3 +235,18 @@ def test_a_clock_that_was_set_back_forgets_what_was(topics, robot):
     mount = load_model(shipped("launch/md100.yaml")).laser.mount
     topics.publish("scan", scan(10.5, [1.0], []))
     assert robot.what.moment()[1][0, 0].pose[0] == pytest.approx(1.0 + mount.x)  # not between 0 and 5
+
+
+def test_a_machine_so_busy_that_every_moment_is_late_does_not_end_the_viewer(monkeypatch):
+    """Between two questions for the time, a second passes."""
+    asked, watched, clock, slept = threading.Event(), threading.Event(), iter(range(100)), []
+
+    def slow(seconds):
+        slept.append(seconds)
+        if len(slept) == 3:
+            asked.set()
+
+    monkeypatch.setattr(source, "time", SimpleNamespace(monotonic=lambda: float(next(clock)), sleep=slow))
+    watched.set()
+    source.RosSource.run(SimpleNamespace(_watched=watched, _open=True, _show=lambda: None), 20.0, asked)
+    assert all(0 < seconds <= 0.1 for seconds in slept)

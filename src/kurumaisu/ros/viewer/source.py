@@ -105,8 +105,9 @@ class RosSource:
                 self._watched.wait(0.2)
                 continue
             self._show()
-            due = max(due + period, time.monotonic() + _BREATH)  # what is late is left out, not made up for
-            time.sleep(due - time.monotonic())
+            now = time.monotonic()  # once: on a busy machine it is later when it is asked again
+            due = max(due + period, now + _BREATH)  # what is late is left out, not made up for
+            time.sleep(due - now)
 
     def close(self) -> None:
         """End what is being recorded."""
