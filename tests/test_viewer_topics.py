@@ -249,4 +249,5 @@ def test_a_machine_so_busy_that_every_moment_is_late_does_not_end_the_viewer(mon
     monkeypatch.setattr(source, "time", SimpleNamespace(monotonic=lambda: float(next(clock)), sleep=slow))
     watched.set()
     source.RosSource.run(SimpleNamespace(_watched=watched, _open=True, _show=lambda: None), 20.0, asked)
+    assert len(slept) == 3
     assert all(0 < seconds <= 0.1 for seconds in slept)

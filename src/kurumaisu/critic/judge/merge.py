@@ -14,6 +14,7 @@ from kurumaisu.critic.judge.sentences import named_causes, wrong_data
 from kurumaisu.critic.values.criticism import (
     UNKNOWN_SCATTER,
     UNRESOLVED,
+    UNRESOLVED_P,
     Criticism,
     LaserFinding,
     Pictures,
@@ -23,7 +24,6 @@ from kurumaisu.critic.values.criticism import (
 from kurumaisu.critic.values.verdict import ChannelGain, Kind, Unknown, Verdict
 
 _NOTHING_SAID = "none"
-_EITHER = 0.5  # posterior of what is unresolved
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
 _PLACES |= {"x": "x of the laser", "y": "y of the laser"}
 _POSES = {  # each against where the reference puts it: it may be wrong itself
@@ -106,7 +106,7 @@ def confirmed_scans(
     for one in finding.stand_ins:
         rest = _with_stand_in(refuted(finding, worth, {one.of}), finding, one)
         gained = measure(rest.settings)
-        if confirmed(gained, finding.nats, free=True) and gained is not None:
+        if gained is not None and confirmed(gained, finding.nats, free=True):
             kept.append((gained.log_density_per_sample.gain, rest, gained))
     if not kept:
         return _unresolved(finding, refuted(finding, worth, ids)), None
@@ -126,7 +126,7 @@ def _unresolved(before: LaserFinding, left: LaserFinding) -> LaserFinding:
         return left
     gone = ", ".join(setting.id for setting in before.settings)
     shape = f"nearest is {gone}, which held-out scans refuse"
-    return replace(left, unknown=(*left.unknown, Unknown(UNKNOWN_SCATTER, UNRESOLVED, shape, _EITHER)))
+    return replace(left, unknown=(*left.unknown, Unknown(UNKNOWN_SCATTER, UNRESOLVED, shape, UNRESOLVED_P)))
 
 
 def _without_faint(

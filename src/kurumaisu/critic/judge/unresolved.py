@@ -24,14 +24,13 @@ from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.unknown import sentences
 from kurumaisu.critic.unknown.intermittent import Intermittent, intermittent
-from kurumaisu.critic.values.criticism import UNRESOLVED, Criticism
+from kurumaisu.critic.values.criticism import UNRESOLVED, UNRESOLVED_P, Criticism
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.critic.values.story import Misfit, bins
 from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
-_P = 0.5  # that any cause that could be told is it
 _LEAST = 5.0  # [nat] of evidence for what cannot be named
 _FAR = 0.02  # share of the way or turn that it moves the chair
 _LOUDER = 1.5  # times the variance that the noise has, beyond which drives held out are not understood
@@ -188,6 +187,6 @@ def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
 
 
 def _amber(criticism: Criticism, shape: str, words: str) -> Criticism:
-    unknown = Unknown("base", UNRESOLVED, shape, _P)
+    unknown = Unknown("base", UNRESOLVED, shape, UNRESOLVED_P)
     verdict = replace(criticism.verdict, verdict="unknown", unknown=(unknown,))
     return replace(criticism, verdict=verdict, story=replace(criticism.story, headline=words))

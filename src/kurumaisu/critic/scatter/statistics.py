@@ -166,7 +166,7 @@ class Statistics:
         groups = list(enumerate(self._groups.names))
         return [
             *(Statistic(f"spread, {name}", count=False, off=True, group=i) for i, name in groups),
-            # Neighbours that share so much scatter their sum by twice as much, as a share of its square.
+            # The square of a sum of many readings is larger by twice what neighbours share of theirs.
             *(
                 Statistic(f"correlation of beams {lag} apart", count=False, off=True, matters=MATTERS / 2)
                 for lag in (1, 2, 4)

@@ -14,6 +14,7 @@ from kurumaisu.types import FloatArray
 Settings = tuple[EffectSetting, ...]
 Progress = Callable[[str], None]
 UNRESOLVED = "unresolved"  # the covariate of what surely is wrong, where the data do not say what it follows
+UNRESOLVED_P = 0.5  # posterior that is told of it: that any cause that could be told is it
 UNKNOWN_CHANNEL = "laser.bias"  # that of what is outside the catalogue, of the mean of readings
 UNKNOWN_SCATTER = "laser.scatter"  # and of how they scatter
 # Of x, y and heading of where scans put the laser, against the reference, with the unit of a thousandth.
