@@ -77,8 +77,14 @@ class Experiment(unittest.TestCase):
         assert "Traceback" not in said
         return said
 
-    def driving(self):
-        self.commands.wait(lambda m: m.linear.x > 0, "driving")
+    def driving(self, process):
+        since = len(self.commands.messages)
+
+        def has_begun():
+            assert process.poll() is None, process.communicate()[0]
+            return any(m.linear.x > 0 for m in self.commands.messages[since:])
+
+        wait_for(has_begun, "driving")
 
     def stopped_properly(self):
         """Zero is the last thing said, for a second of simulated time; then nothing; the chair rests."""
@@ -109,14 +115,14 @@ class Experiment(unittest.TestCase):
     def test_ctrl_c_and_kill_stop_the_chair(self):
         for number in (signal.SIGINT, signal.SIGTERM):
             process = self.start("slow", script=SLOW)
-            self.driving()
+            self.driving(process)
             process.send_signal(number)
             assert "slow: interrupted" in self.end(process, 1)
             self.stopped_properly()
 
     def test_rosnode_kill_stops_the_chair(self):
         process = self.start("slow", "__name:=victim", script=SLOW)
-        self.driving()
+        self.driving(process)
         subprocess.run(["rosnode", "kill", "/victim"], check=True, capture_output=True, timeout=30)
         assert "slow: interrupted" in self.end(process, 1)
         self.stopped_properly()
@@ -137,7 +143,7 @@ class Experiment(unittest.TestCase):
     def test_nothing_is_published_while_time_stands(self):
         pause = rospy.ServiceProxy("pause", SetBool)
         process = self.start("slow", script=SLOW)
-        self.driving()
+        self.driving(process)
         assert pause(True).success
         self.silent_for(1.0)  # what was under way arrives
         count = len(self.commands.messages)
@@ -145,13 +151,13 @@ class Experiment(unittest.TestCase):
         assert len(self.commands.messages) == count
         assert process.poll() is None
         assert pause(False).success
-        self.driving()
+        self.driving(process)
         process.send_signal(signal.SIGINT)
         self.end(process, 1)
 
     def test_who_commands_too_stops_it_and_keeps_it_from_starting(self):
         process = self.start("slow", script=SLOW)
-        self.driving()
+        self.driving(process)
         other = Commander("experiment_vel")
         self.addCleanup(other.close)
         other.say(0.0, 0.0)
@@ -172,7 +178,7 @@ class Experiment(unittest.TestCase):
 
     def test_the_joystick_takes_over(self):
         process = self.start("slow", script=SLOW)
-        self.driving()
+        self.driving(process)
         hand = Commander("joy_vel")
         self.addCleanup(hand.close)
         hand.say(0.0, 0.1)
@@ -193,7 +199,7 @@ class Experiment(unittest.TestCase):
 
     def test_a_chair_that_is_carried_away_stops_it(self):
         process = self.start("slow", script=SLOW)
-        self.driving()
+        self.driving(process)
         pose = Pose(position=Point(0.0, 5.0, 0.0), orientation=quaternion_of(0.0))
         assert rospy.ServiceProxy("set_pose", SetPose)(name="chair", pose=pose).success
         assert "left the box" in self.end(process, 1)
