@@ -130,6 +130,8 @@ def recording(folder, effect, size, seed, scans=50, *, rho=0.0, common=0.0, trut
         row = np.round(np.round(row / step) * step, 3)
         if effect == "laser.dropout":
             row[rng.random(BEAMS) < size] = np.nan
+        if effect == "laser.heavy_tails":
+            row += np.where(rng.random(BEAMS) < size, 0.3 * rng.standard_normal(BEAMS), 0.0)
         row[row < 0.06] = np.nan
         row[row > 4.0] = np.inf
         out.append(row)

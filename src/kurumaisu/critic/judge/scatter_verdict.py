@@ -29,6 +29,7 @@ from kurumaisu.params import EffectSetting
 # Share of what single readings scatter by, from which it matters that whole scans are off together: what neighbours
 # have in common beyond the simplest equation for it moves the mean of a scan as well.
 _HEARD = 0.06
+_STRAY = 2e-4  # share of readings elsewhere, below which nobody minds: one of each seven scans of a URG-04LX
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class MeanFit:
 class Scatter:
     """What acts on how readings scatter: effects; curves in no catalogue, the likeliest first; what they mend.
 
-    slight: effects that take so few readings away that nobody misses them.
+    slight: effects that take away or make wrong so few readings that nobody minds.
     """
 
     effects: list[ScatterEffect]
@@ -124,8 +125,8 @@ def _of_readings(
             curves, search, found = [level, *curves[1:]], other, fewer
             break
     compared = (search.compared(statistics.names(), [each.setting for each in found]),) if found else ()
-    losses = ((each.setting.id, simulate.lost(each.setting)) for each in found)
-    slight = frozenset(name for name, share in losses if share is not None and share < MATERIAL)
+    touched = ((each.setting.id, *simulate.touched(each.setting)) for each in found)
+    slight = frozenset(name for name, lost, moved in touched if lost < MATERIAL and moved < _STRAY)
     return Scatter(found, curves, compared, slight)
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from operator import attrgetter
 
 import numpy as np
@@ -22,7 +22,8 @@ from kurumaisu.params import EffectSetting
 from kurumaisu.types import BoolArray, FloatArray
 
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
-_SIZES = (0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)  # in units of a parameter's scale, tried first
+# In units of a parameter's scale, tried first: a thousandth of the readings shows.
+_SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 _HALVED = 12  # times that the way between two of these is halved at most, where readings pile up between them
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
@@ -60,17 +61,12 @@ class StatisticsChange:
 
 @dataclass(frozen=True)
 class ScatterPiece:
-    """An effect that acts: its setting, which parameters are fitted, posterior and log evidence of it.
-
-    rivals: effects, fitted likewise, that might have done what it does.
-    """
+    """An effect that acts: its setting, which parameters are fitted, and its log evidence beside the others."""
 
     effect: type[Mechanism]
     setting: EffectSetting
     free: tuple[str, ...]
-    p: float
-    nats: float
-    rivals: tuple[ScatterPiece, ...] = ()
+    nats: float = 0.0
 
     @property
     def price(self) -> float:
@@ -193,66 +189,46 @@ class ScatterFit:
 
     def _rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
         """Return the best of some sizes of one form's parameters."""
+        names = dict.fromkeys(push.name for push in pushes)
+        changes = {(push.name, push.value): push.change for push in pushes}
         low, best = np.inf, dict[str, float]()
-        for name in dict.fromkeys(push.name for push in pushes):
-            known = at + sum(push.change for push in pushes if best.get(push.name) == push.value)
-            for push in pushes:
-                misfit = self.likeness.cost(known + push.change) if push.name == name else np.inf
-                if misfit < low - _FREE:
-                    low, best = misfit, {**{k: v for k, v in best.items() if k != name}, name: push.value}
+        for _, name in product(range(_PASSES), names):
+            others = {k: v for k, v in best.items() if k != name}
+            known = at + sum(changes[each] for each in others.items())
+            tried = [(self.likeness.cost(known + push.change), push.value) for push in pushes if push.name == name]
+            misfit, value = min(tried)
+            plain = self.likeness.cost(known) if others else np.inf
+            low, best = (misfit, {**others, name: value}) if misfit < plain - _FREE else (plain, others)
         return RoughFit(low, pushes[0].effect, pushes[0].form, best)
-
-    def halves(
-        self, piece: ScatterPiece, rival: ScatterPiece, beside: Sequence[EffectSetting]
-    ) -> tuple[ScatterPiece, float]:
-        """Return the second of two effects that were fitted in each other's place, fitted together, and the misfit.
-
-        Each begins with half of its power.
-        """
-        pair = []
-        for one in (piece, rival):
-            sizes = {
-                p.name: p.null + np.sqrt(0.5) * (one.setting.parameters[p.name] - p.null)
-                for p in one.effect.parameters
-                if p.name in one.free
-            }
-            values = {**one.setting.parameters, **sizes}
-            pair.append(replace(one, setting=EffectSetting(one.setting.id, values)))
-        (_, new), misfit = self.together(pair, beside)
-        return new, misfit
 
     def plain(self, start: RoughFit) -> ScatterPiece:
         """Return an effect of such sizes, nothing fitted yet."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
-        return ScatterPiece(start.effect, setting, tuple(start.values), 0.0, 0.0)
+        return ScatterPiece(start.effect, setting, tuple(start.values))
 
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         (piece,), low = self.together([self.plain(start)], beside)
-        for _ in range(_PASSES):
-            known = piece.free
-            for p in self._parameters(start.effect):
-                if p.name not in piece.free and low > _POOR:
-                    piece, low = self._with(p, piece, low, beside)
-            if piece.free == known:
-                break
+        return self.shaped(piece, low, beside)
+
+    def shaped(self, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
+        """Return an effect with what shapes it fitted, too, as far as it helps, and its misfit; low: without that."""
+        shapes = [p for p in piece.effect.parameters if (piece.setting.id, p.name) in self._shapes]
+        for _, p in product(range(_PASSES), shapes):
+            if p.name not in piece.free and low > _POOR:
+                piece, low = self._with(p, piece, low, beside)
         return piece, low
 
     def _with(
         self, p: Parameter, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]
     ) -> tuple[ScatterPiece, float]:
-        """Return an effect with a further parameter fitted, where that helps, and its misfit; low: without it."""
+        """Return an effect with its shape fitted, too, where that helps, and its misfit; low: without it."""
         name, values = piece.setting.id, piece.setting.parameters
         tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
         misfits = [self.misfit((*beside, each)) for each in tried]
-        more = replace(piece, setting=tried[int(np.argmin(misfits))], free=(*piece.free, p.name))
-        if min(misfits) < low - _FREE:
-            (better,), least = self.together([more], beside)
-        elif (name, p.name) in self._shapes:
-            # A wider burst of fewer readings: neither of both helps alone.
-            (better,), least = self.together([replace(more, setting=piece.setting)], beside)
-        else:
-            return piece, low
+        # A wider burst of fewer readings: neither of both helps alone.
+        setting = tried[int(np.argmin(misfits))] if min(misfits) < low - _FREE else piece.setting
+        (better,), least = self.together([replace(piece, setting=setting, free=(*piece.free, p.name))], beside)
         return (better, least) if least < low - _FREE else (piece, low)
 
     def together(

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Effects that change how readings scatter, not their mean: likelihood of statistics, simulated with the very effects.
 
-One effect is added at a time; those that change the same numbers are then fitted together, and what is no longer needed
-goes. What seemed to act when its company was not yet known is weighed against its rivals again at the end.
+As for the chair, single effects propose, and the evidence of the sets that are fitted decides. The likeliest set is
+gone on from, and so is the likeliest that does without each of its effects: two may do together what that one does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from operator import attrgetter, itemgetter
+from operator import attrgetter
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, softmax
 
 from kurumaisu import effects
 from kurumaisu.critic.scatter.scatter_fit import RoughFit, ScatterFit, ScatterPiece, StatisticsChange
@@ -27,12 +27,14 @@ _ENOUGH = 5.0  # nats of evidence from which an effect is taken; nulls reach 3
 _LEFT = 0.02  # share of an effect's evidence that its own form may leave to one that changes the same numbers
 _MOST_LEFT = 15.0  # nats at most: ten numbers off by twice what the likelihood allows for another form
 _CURVE_LEFT = 0.1  # share of a curve's evidence likewise: nobody knows whether noise is added or multiplied there
-_WEAK = 0.05  # share of the strongest effect's evidence, from which another one is beyond doubt
 _LARGEST = 6  # effects in a set
-_REFITS = 4  # effects that are refitted
-_CLOSE = 0.35  # share of what the best of them gains that another one must gain, to be refitted
+_REFITS = 3  # effects whose sizes are fitted beside a set
+_PROMISED = 3.0  # nats that such an effect must promise
+_CLOSE = 0.35  # share likewise, of what the best of them promises
+_HOPELESS = 30.0  # nats by which a set may promise a worse fit than the likeliest has: changes are no sums
 _COMPARED = 10  # simulations with the effects, for the report
-_OVERLAP = 0.3  # cosine of two effects' changes of the statistics, from which they are fitted together
+_score = attrgetter("score")
+EffectSet = frozenset[type[Mechanism]]
 
 
 @dataclass(frozen=True)
@@ -49,22 +51,22 @@ class ScatterEffect:
     rivals: Mapping[str, float]
 
 
-_cost, _nats = itemgetter(1), attrgetter("nats")  # of what was fitted; of a piece
+@dataclass(frozen=True)
+class _Fitted:
+    """A fitted set: its effects, the misfit [nat], the log evidence, and that less what each effect must bring."""
 
+    pieces: tuple[ScatterPiece, ...]
+    cost: float
+    nats: float
+    score: float
 
-def _without_piece(pieces: Sequence[ScatterPiece], one: ScatterPiece) -> list[ScatterPiece]:
-    return [piece for piece in pieces if piece.effect is not one.effect]
+    @property
+    def effects(self) -> EffectSet:
+        return frozenset(piece.effect for piece in self.pieces)
 
-
-def _of_any(piece: ScatterPiece) -> float:
-    """Return the evidence [nat] that a piece or one of its rivals acts."""
-    return float(logsumexp([piece.nats, *(rival.nats for rival in piece.rivals)]))
-
-
-def _by_effect(pieces: Sequence[ScatterPiece]) -> list[list[ScatterPiece]]:
-    """Return the pieces of each effect."""
-    effects_there = dict.fromkeys(piece.effect for piece in pieces)
-    return [[piece for piece in pieces if piece.effect is effect] for effect in effects_there]
+    @property
+    def settings(self) -> list[EffectSetting]:
+        return [piece.setting for piece in self.pieces]
 
 
 class ScatterSearch:
@@ -74,31 +76,23 @@ class ScatterSearch:
         """Take the fit; curve: evidence [nat] of a curve in the model, which misses steps, and what noise is like."""
         self._fit, self._enough = fit, max(_MOST_LEFT, _CURVE_LEFT * curve) if curve > 0 else _ENOUGH
         self._likeness = self._fit.likeness
+        self._known: dict[EffectSet, _Fitted] = {}
 
     def run(self) -> list[ScatterEffect]:
-        """Return the effects, added while the evidence grows."""
+        """Return the effects of the likeliest set."""
         if not self._off(self._likeness.offset):
             return []
         pushes = list(self._fit.pushes())
-        chosen: list[ScatterPiece] = []
-        gone: set[type[Mechanism]] = set()
-        while len(chosen) < _LARGEST:
-            new = self._step(pushes, chosen, gone)
-            if new is None or new.nats < self._least(chosen, new):
-                break
-            chosen = self._straightened(pushes, self._settled(pushes, chosen, new, gone))
-        chosen = self._certain(self._polished(chosen))
-        settings = [piece.setting for piece in chosen]
-        return [
-            ScatterEffect(
-                piece.setting,
-                piece.p,
-                piece.nats,
-                self._fit.errors(piece, settings),
-                {rival.setting.id: rival.p for rival in piece.rivals},
-            )
-            for piece in chosen
-        ]
+        self._keep(self._weighed((), self._fit.misfit(())))
+        gone_on: set[EffectSet] = set()
+        while True:
+            best = max(self._known.values(), key=_score)
+            ways = [one for one in (best, *self._without_each(best)) if one.effects not in gone_on]
+            if not ways:
+                return self._told(best)
+            gone_on.add(ways[0].effects)
+            for new in self._proposed(pushes, ways[0], best):
+                self._keep(new)
 
     def compared(self, names: Sequence[str], settings: Sequence[EffectSetting]) -> Comparison:
         """Return the statistics of the measured scans and of simulated ones without and with effects."""
@@ -107,198 +101,88 @@ class ScatterSearch:
         known = self._likeness
         return Comparison(blamed, tuple(names), known.measured, known.offset, extended, known.sd)
 
+    def _without_each(self, best: _Fitted) -> Iterator[_Fitted]:
+        """Yield the best sets that do without one of a set's effects: what its evidence is held against."""
+        for piece in best.pieces:
+            yield max((one for one in self._known.values() if piece.effect not in one.effects), key=_score)
+
     def _off(self, numbers: FloatArray) -> bool:
         """Return whether the measured statistics are off simulated ones by more than chance."""
         units = self._likeness.units
         return bool(np.abs(units(self._likeness.measured) - units(numbers)).max() >= _QUIET)
 
-    def _heat(self, settings: Sequence[EffectSetting]) -> float:
-        return self._likeness.heat(self._fit.statistics(settings, (1, 2)))
+    def _keep(self, new: _Fitted) -> None:
+        """Keep a fitted set, if no likelier fit of it is known."""
+        known = self._known.get(new.effects)
+        if known is None or new.score > known.score:
+            self._known[new.effects] = new
 
-    def _step(
-        self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece], gone: set[type[Mechanism]]
-    ) -> ScatterPiece | None:
-        """Return the effect to add; None where there is too little."""
-        beside = [piece.setting for piece in chosen]
-        at = self._fit.statistics(beside, (1, 2))
-        here = self._likeness.cost(at)
-        without = {*gone, *(piece.effect for piece in chosen)}
-        by_effect = {
-            effect: [push for push in pushes if push.effect is effect] for effect in self._fit.candidates(without)
-        }
-        starts = [self._fit.rough(own, at) for own in by_effect.values() if own]
-        starts = sorted((start for start in starts if start.low < here), key=attrgetter("low"))
-        tried: list[ScatterPiece] = []
-        for start in starts[:_REFITS]:
-            if here - start.low < _CLOSE * (here - starts[0].low):
+    def _proposed(self, pushes: Sequence[StatisticsChange], known: _Fitted, best: _Fitted) -> Iterator[_Fitted]:
+        """Yield a set without one of its effects each, and with those that promise most beside it, to be the best."""
+        for piece in known.pieces if len(known.pieces) > 1 else ():
+            left, cost = self._fit.together([one for one in known.pieces if one is not piece], ())
+            yield self._weighed(left, cost)
+            for i, one in enumerate(left):  # in another shape it may do what the one that is gone did
+                others = [*left[:i], *left[i + 1 :]]
+                shaped, misfit = self._fit.shaped(one, cost, [other.setting for other in others])
+                if shaped is not one:
+                    yield self._weighed([*others, shaped], misfit)
+        if len(known.pieces) == _LARGEST:
+            return
+        starts = sorted(self._starts(pushes, known), key=attrgetter("low"))[:_REFITS]
+        for start in starts:
+            gain = known.cost - start.low
+            if gain < max(_PROMISED, _CLOSE * (known.cost - starts[0].low)) or start.low > best.cost + _HOPELESS:
                 break
-            piece, misfit = self._fit.alone(start, beside)
-            tried.append(_valued(piece, here - misfit))
-        best = _weighed(tried) if tried else None
-        if (best is None or best.nats < self._least(chosen, best)) and self._off(at):
-            tried = [*tried, *self._halved(chosen, without, here)]
-            best = _weighed([max(same, key=_nats) for same in _by_effect(tried)]) if tried else None
-        if best is None or best.nats < 0:
-            return None
-        return _weighed([best, *best.rivals], self._heat([*beside, best.setting]))
+            piece, cost = self._fit.alone(start, known.settings)
+            group = [*known.pieces, piece]
+            if known.pieces:
+                group, cost = self._fit.together(group, ())
+            yield self._weighed(group, cost)
 
-    def _halved(
-        self, chosen: Sequence[ScatterPiece], without: set[type[Mechanism]], here: float
-    ) -> Iterator[ScatterPiece]:
-        """Yield rivals of the chosen effects, each fitted together with the one that was taken for it.
+    def _starts(self, pushes: Sequence[StatisticsChange], known: _Fitted) -> Iterator[RoughFit]:
+        """Yield rough sizes of each other effect beside a set."""
+        at = self._fit.statistics(known.settings, (1, 2))
+        for effect in self._fit.candidates(set(known.effects)):
+            own = [push for push in pushes if push.effect is effect]
+            if own:
+                yield self._fit.rough(own, at)
 
-        Of two that act, each alone explains nearly all, and the other one added to that much of it then nothing.
-        """
-        for piece in chosen:
-            beside = [other.setting for other in chosen if other is not piece]
-            for rival in piece.rivals:
-                if rival.effect not in without and self._fit.overlap(piece, rival) > _OVERLAP:
-                    new, misfit = self._fit.halves(piece, rival, beside)
-                    yield _valued(new, here - misfit)
+    def _weighed(self, pieces: Sequence[ScatterPiece], cost: float) -> _Fitted:
+        """Return a fitted set with its evidence beside that of none; cost: its misfit [nat]."""
+        count, weighed = len(effects.LASER), []
+        for piece in pieces:
+            gain = self._fit.misfit([one.setting for one in pieces if one is not piece]) - cost
+            paid = float(occam(np.sqrt(max(2 * gain, 0.0)))) + piece.price - log_prior(1, count) + log_prior(0, count)
+            weighed.append((replace(piece, nats=gain - paid), paid))
+        nats = self._fit.misfit(()) - cost - sum(paid for _, paid in weighed)
+        out = tuple(piece for piece, _ in weighed)
+        return _Fitted(out, cost, nats, nats - sum(self._least(out, piece) for piece in out))
 
-    def _straightened(self, pushes: Sequence[StatisticsChange], chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
-        """Return the pieces, those of several parameters begun anew with the plainest where that is better.
-
-        Before the others were known, its further parameters may have bent to do what they do: beams that are lost where
-        they meet walls obliquely, say, hide that these are read noisily. No small step leads back from there.
-        """
-        out = list(chosen)
-        for i, old in enumerate(chosen):
-            beside = [piece.setting for piece in out if piece.effect is not old.effect]
-            if len(old.free) < 2 or not beside:
-                continue
-            plain = self._fit.plain(self._begun(pushes, old, beside))
-            (new,), cost = self._fit.together([plain], beside)
-            if cost + new.price < self._fit.misfit([*beside, old.setting]) + old.price:
-                out[i] = replace(old, setting=new.setting, free=new.free)
-        return out
-
-    def _begun(
-        self, pushes: Sequence[StatisticsChange], piece: ScatterPiece, beside: Sequence[EffectSetting]
-    ) -> RoughFit:
-        """Return rough sizes of a piece's effect beside others, whatever it had been fitted to."""
-        own = [push for push in pushes if push.effect is piece.effect]
-        return self._fit.rough(own, self._fit.statistics(beside, (1, 2)))
-
-    def _certain(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
-        """Return the pieces weighed in the company that is there last, without those that it makes superfluous."""
-        if len(chosen) < 2:
-            return list(chosen)
-        known = {piece.effect: piece.rivals for piece in chosen}
-        while True:
-            weighed = self._reweighed(chosen)
-            weak = [piece for piece in weighed if _of_any(piece) < self._least(_without_piece(weighed, piece), piece)]
-            if not weak or len(weighed) < 2:
-                return weighed
-            left = [
-                replace(one, rivals=known.get(one.effect, ())) for one in _without_piece(weighed, min(weak, key=_nats))
-            ]
-            chosen = self._polished(left)
-
-    def _reweighed(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
-        """Return the pieces, each weighed against its rivals and none beside all others, not known when it came.
-
-        Where the whole does not fit, evidence for another part of it is worth as much less, that it acts, too.
-        """
-        out = list(chosen)
-        for i, piece in enumerate(chosen):
-            others = _without_piece(out, piece)
-            there = {other.effect for other in others}
-            beside = [other.setting for other in others]
-            without = self._without(piece, others)
-            rivals = [rival for rival in piece.rivals if rival.effect not in there]
-            tried = [self._fit.together([one], beside) for one in (piece, *rivals)]
-            valued = [_valued(one, without - misfit) for (one,), misfit in tried]
-            heat = self._heat([*beside, max(valued, key=_nats).setting])
-            out[i] = _weighed(valued, heat, heat)
-        swapped = any(one.effect is not other.effect for one, other in zip(out, chosen, strict=True))
-        return self._polished(out) if swapped else out
-
-    def _without(self, piece: ScatterPiece, others: Sequence[ScatterPiece]) -> float:
-        """Return the misfit of the others without a piece, those like it fitted to what it would leave them."""
-        like = [other for other in others if self._fit.overlap(other, piece) > _OVERLAP]
-        rest = [other.setting for other in others if other not in like]
-        return self._fit.together(like, rest)[1] if like else self._fit.misfit(rest)
-
-    def _least(self, chosen: Sequence[ScatterPiece], new: ScatterPiece) -> float:
+    def _least(self, pieces: Sequence[ScatterPiece], new: ScatterPiece) -> float:
         """Return the evidence from which an effect is taken beside others [nat]: they may act in another form."""
-        left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in chosen)
-        return max(self._enough, *(min(_MOST_LEFT, nats) for nats in left)) if chosen else self._enough
+        stronger = [piece for piece in pieces if piece.nats > new.nats]
+        left = (_LEFT * piece.nats * self._fit.overlap(piece, new) ** 2 for piece in stronger)
+        return max([self._enough, *(min(_MOST_LEFT, nats) for nats in left)])
 
-    def _settled(
-        self,
-        pushes: Sequence[StatisticsChange],
-        chosen: Sequence[ScatterPiece],
-        new: ScatterPiece,
-        gone: set[type[Mechanism]],
-    ) -> list[ScatterPiece]:
-        """Return the pieces with a new one, fitted together with those like it; what it makes superfluous is gone."""
-        like = [piece for piece in chosen if self._fit.overlap(piece, new) > _OVERLAP]
-        rest = [piece for piece in chosen if piece not in like]
-        if not like:
-            return [*chosen, new]
-        beside = [piece.setting for piece in rest]
-        group, cost = self._fit.together([*like, new], beside)
-        for old in like:
-            fewer, more = min(self._without_it(pushes, _without_piece(group, old), beside), key=_cost)
-            z = np.sqrt(max(2 * (more - cost), 0.0))
-            nats = more - cost - float(occam(np.array(z))) - old.price
-            if nats < _ENOUGH:
-                group, cost = fewer, more
-                gone.add(old.effect)
-            else:
-                group = [replace(piece, nats=nats) if piece.effect is old.effect else piece for piece in group]
-        return [*rest, *group]
+    def _told(self, best: _Fitted) -> list[ScatterEffect]:
+        """Return the effects of a set, each weighed against all sets that were fitted.
 
-    def _without_it(
-        self, pushes: Sequence[StatisticsChange], left: Sequence[ScatterPiece], beside: Sequence[EffectSetting]
-    ) -> Iterator[tuple[list[ScatterPiece], float]]:
-        """Yield fits of those that are left of a group, and their misfits: as they are, and one of them begun anew.
-
-        Beside the one that is gone, their further parameters did what it did not.
+        Where the whole does not fit, evidence for a part of it is worth as much less.
         """
-        yield self._fit.together(left, beside)
-        for piece in left:
-            others = _without_piece(left, piece)
-            known = (*beside, *(other.setting for other in others))
-            one, cost = self._fit.alone(self._begun(pushes, piece, known), known)
-            yield [*others, replace(piece, setting=one.setting, free=one.free)], cost
-
-    def _polished(self, chosen: Sequence[ScatterPiece]) -> list[ScatterPiece]:
-        """Return all pieces fitted together, without weak ones that stood in for wrong sizes of others."""
-        if len(chosen) < 2:
-            return list(chosen)
-        group, cost = self._fit.together(chosen, ())
-        strong = max(piece.nats for piece in group)
-        for old in sorted(group, key=lambda piece: piece.nats):
-            others = [piece for piece in group if piece.effect is not old.effect]
-            # What it was worth when it came: the others were not yet fitted as well as now.
-            still = self._fit.misfit([piece.setting for piece in others]) - cost
-            if not others or (old.nats > _WEAK * strong and still >= self._least(others, old)):
-                continue
-            fewer, more = self._fit.together(others, ())
-            z = np.sqrt(max(2 * (more - cost), 0.0))
-            if more - cost - float(occam(np.array(z))) - old.price < self._least(others, old):
-                group, cost = fewer, more
-        return group
-
-
-def _valued(piece: ScatterPiece, gain: float) -> ScatterPiece:
-    """Return a piece with its log evidence, for what it gains [nat] of log likelihood."""
-    count, z = len(effects.LASER), np.sqrt(max(2 * gain, 0.0))
-    cost = float(occam(np.array(z))) + piece.price
-    return replace(piece, nats=gain - cost + log_prior(1, count) - log_prior(0, count))
-
-
-def _weighed(tried: Sequence[ScatterPiece], heat: float = 1.0, doubt: float = 1.0) -> ScatterPiece:
-    """Return the likeliest of some pieces with its posterior, and the others as its rivals with theirs.
-
-    heat: by how much what the likeliest leaves is more than chance [1]; where none of them fits, odds between them are
-    worth as much less. doubt: likewise, of the odds that any of them acts.
-    """
-    nats = np.array([piece.nats for piece in tried])
-    some = -np.expm1(-logsumexp([0.0, *(nats / doubt)]))
-    shares = some * np.exp(nats / heat - logsumexp(nats / heat))
-    every = [replace(piece, p=float(p), rivals=()) for piece, p in zip(tried, shares, strict=True)]
-    best = max(every, key=_nats)
-    return replace(best, rivals=tuple(piece for piece in every if piece is not best))
+        heat = self._likeness.heat(self._fit.statistics(best.settings, (1, 2)))
+        out = []
+        for piece in best.pieces:
+            others = best.effects - {piece.effect}
+            nats = best.nats - max(one.nats for one in self._known.values() if one.effects <= others)
+            some = float(expit(nats / heat))
+            # Of sets in which it acts, or something in its place.
+            every = [one for one in self._known.values() if not one.effects <= others]
+            shares = softmax([one.score / heat for one in every]) * some
+            own = float(sum(p for p, one in zip(shares, every, strict=True) if piece.effect in one.effects))
+            rivals = dict[str, float]()
+            for p, one in zip(shares.tolist(), every, strict=True):
+                for effect in one.effects - best.effects if piece.effect not in one.effects else ():
+                    rivals[effect.id] = rivals.get(effect.id, 0.0) + p
+            out.append(ScatterEffect(piece.setting, own, nats, self._fit.errors(piece, best.settings), rivals))
+        return out

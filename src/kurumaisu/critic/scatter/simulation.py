@@ -55,13 +55,13 @@ class ScatterSimulator:
         """Return the statistics of a simulation."""
         return self._simulated(settings, seed, np.zeros(self._missed.shape[:2]))
 
-    def lost(self, setting: EffectSetting) -> float | None:
-        """Return which share of the readings an effect takes away; None if it changes those that are left."""
+    def touched(self, setting: EffectSetting) -> tuple[float, float]:
+        """Return which shares of the readings an effect takes away, and makes others."""
         (without, _), (left, _) = self.scans((), 0), self.scans((setting,), 0)
-        both = np.isfinite(without) & np.isfinite(left)
-        if not np.array_equal(without[both], left[both]):
-            return None
-        return float(1 - np.count_nonzero(both) / max(np.count_nonzero(np.isfinite(without)), 1))
+        there, both = np.isfinite(without), np.isfinite(without) & np.isfinite(left)
+        other = both & (np.nan_to_num(without) != np.nan_to_num(left))
+        lost, moved = np.count_nonzero(there & ~both), np.count_nonzero(other)
+        return lost / max(np.count_nonzero(there), 1), moved / max(np.count_nonzero(there), 1)
 
     def _simulated(self, settings: Sequence[EffectSetting], seed: int, off: FloatArray) -> FloatArray:
         """Return the statistics of readings that are off (k, b) [m] from where they are expected."""

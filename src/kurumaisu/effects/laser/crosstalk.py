@@ -19,7 +19,7 @@ class Crosstalk(ReadingEffect):
         Parameter("probability", "1", null=0.0, scale=0.3, lower=0.0, upper=1.0),
         Parameter("width", "rad", null=0.3, scale=0.3, lower=0.0, upper=6.3),
         Parameter("drift", "rad/s", null=0.5, scale=0.5, lower=-100.0, upper=100.0),
-        Parameter("reach", "m", null=4.0, scale=2.0, lower=0.1, upper=100.0),
+        Parameter("reach", "m", null=4.0, scale=2.0, lower=1.0, upper=100.0),
     )
     sentence = "bursts of random ranges come and go, as from another laser's light"
     formula = "where |φ − drift · t| < width / 2 (mod 2π), with probability: reading uniform in 0 to reach"
