@@ -201,14 +201,10 @@ class ScatterFit:
             low, best = (misfit, {**others, name: value}) if misfit < plain - _FREE else (plain, others)
         return RoughFit(low, pushes[0].effect, pushes[0].form, best)
 
-    def plain(self, start: RoughFit) -> ScatterPiece:
-        """Return an effect of such sizes, nothing fitted yet."""
-        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
-        return ScatterPiece(start.effect, setting, tuple(start.values))
-
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
-        (piece,), low = self.together([self.plain(start)], beside)
+        setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
+        (piece,), low = self.together([ScatterPiece(start.effect, setting, tuple(start.values))], beside)
         return self.shaped(piece, low, beside)
 
     def shaped(self, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
