@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from kurumaisu.critic.base.covariates import with_past
 from kurumaisu.critic.base.drive import driven
 from kurumaisu.critic.base.replay import model_of
 from kurumaisu.critic.data.excerpt import bounded, with_elapsed_time
@@ -57,7 +58,8 @@ def criticise(
     moved = any(driven(run) for run in recording.runs if run.name in recording.train)
     if not moved and all(run.scan is None for run in recording.runs):
         raise Error(f"{recording.runs[0].name}: has neither voltages nor commands nor odometry, and no scans either")
-    with criticise_in_own_process(recording, model, model_file, ids) as scans_say:
+    scanned = with_past(recording, model)
+    with criticise_in_own_process(scanned, model, model_file, ids) as scans_say:
         whole = with_elapsed_time(recording)
         base, extension = criticise_drives(whole, model, progress, ids) if moved else (None, NOTHING)
         if base is not None and base.verdict.verdict == "invalid_data":
@@ -70,10 +72,10 @@ def criticise(
     def again(moved: Recording) -> LaserFinding:
         return criticise_scans(moved, model, progress, ids)
 
-    seen, stamped = by_its_clock(found.verdict.causes, scans, recording, model, again)
+    seen, stamped = by_its_clock(found.verdict.causes, scans, scanned, model, again)
     scans, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
     forecast = extension.forecast
-    if forecast is not None and stamped is not recording:
+    if forecast is not None and stamped is not scanned:
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
     stamped = with_elapsed_time(stamped)
     progress("measuring the gain on held-out scans")

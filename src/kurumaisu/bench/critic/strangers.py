@@ -84,7 +84,8 @@ class Case:
     @property
     def followed(self) -> bool:
         """Tell whether one of the first three curves is over what the unknown follows."""
-        accepted = (self.truth["unknown"] or {}).get("covariates", ())
+        names = (self.truth["unknown"] or {}).get("covariates", ())
+        accepted = [name.replace("since_change", "since_command") for name in names]
         said = [_as_strangers_say(one.covariate) for one in self.verdict.unknown[:3]] if self.verdict else []
         return any(name in said or f"time_{name}" in said or f"distance_{name}" in said for name in accepted)
 

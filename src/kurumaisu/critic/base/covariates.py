@@ -7,12 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from kurumaisu import _core, geometry
-from kurumaisu.critic.base.drive import GRID, Drive
-from kurumaisu.critic.values.recording import Run
+from kurumaisu import _core, effects, geometry
+from kurumaisu.critic.base import replay
+from kurumaisu.critic.base.drive import GRID, Drive, driven, prepare_all
+from kurumaisu.critic.values.recording import Recording, Run, Series
+from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 _SMOOTH = 1.0  # [s] before and after a row
+_PAST = ("since_command", "since_rest", "since_reversal")  # a chair that has just stopped nods, and its laser with it
 
 
 def with_covariates(drive: Drive, run: Run) -> Drive:
@@ -35,6 +38,28 @@ def with_covariates_but_place(drive: Drive, run: Run) -> Drive:
         held = np.maximum(np.searchsorted(run.voltage.t, middle, side="right") - 1, 0)
         known |= {name: run.voltage.column(name)[held] for name in ("v_f", "v_s")}
     return replace(drive, known={**drive.known, **known})
+
+
+def with_past(recording: Recording, model: Model) -> Recording:
+    """Return the recording with what went before, by the model's drives, as covariates of each run that has scans.
+
+    A covariate of such a name that was measured is left as it is. Before the first time, it is as long ago as the run.
+    """
+    return replace(recording, runs=tuple(_with_past(run, model) for run in recording.runs))
+
+
+def _with_past(run: Run, model: Model) -> Run:
+    if run.scan is None or not len(run.scan.t) or run.pose is None or not driven(run):
+        return run
+    drive = prepare_all(run, model, float(run.scan.t[-1]))
+    motion, middle = replay.motion(drive, model, ()), _middle(drive)
+    known = {}
+    for name in _PAST:
+        if (name, drive.source) != ("since_command", "odom"):  # rows of odometry are no commands
+            values = effects.Follower(name, 0.0).values(motion)
+            past = np.where(np.isfinite(values), values, middle[-1] - middle[0])
+            known[name] = Series(middle, past[:, np.newaxis], (name,))
+    return replace(run, covariates={**known, **run.covariates})
 
 
 def _smoothed(drive: Drive) -> FloatArray:

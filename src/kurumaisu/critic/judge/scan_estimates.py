@@ -16,6 +16,7 @@ from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
 from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.unknown.bases import Basis
+from kurumaisu.critic.unknown.sentences import COVARIATES
 from kurumaisu.critic.unknown.shapes import grid, shape_of
 from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER, StandIn
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
@@ -32,7 +33,7 @@ _RAMP, _ALIKE = 20000, 1e-4  # readings that show what an effect does; [m] by wh
 _LACKS = 0.05  # share of readings of that part, at least
 _LISTED = 3
 # All others of RANGE_COVARIATES are angles.
-_UNITS = dict.fromkeys(("range", "hit_x", "hit_y", "x", "y"), "m") | {"time": "s", "v": "m/s", "w": "rad/s"}
+_UNITS = dict.fromkeys(("range", "hit_x", "hit_y"), "m") | {"time": "s"}
 
 
 def estimates_of(setting: EffectSetting, sds: Mapping[str, float]) -> dict[str, Estimate]:
@@ -198,14 +199,16 @@ def stand_ins(curves: Sequence[ScatterCurve]) -> Iterator[StandIn]:
 
 def _called(basis: Basis) -> str:
     """Return what a reader calls a covariate: a column as the recording calls it."""
-    return basis.covariate.replace("_", " ") if basis.covariate in effects.RANGE_COVARIATES else basis.covariate
+    name = basis.covariate
+    return name.replace("_", " ") if name in effects.RANGE_COVARIATES else COVARIATES.get(name, (name,))[0]
 
 
 def shape(curve: ReadingCurve, of: str) -> str:
     """Return a curve's shape with place and size, each with its 90 % interval; of: its unit."""
     found, at = shape_of(curve), grid(curve)
     basis = curve.basis
-    unit = _UNITS.get(basis.covariate, "rad" if basis.covariate in effects.RANGE_COVARIATES else "")
+    plain = "rad" if basis.covariate in effects.RANGE_COVARIATES else COVARIATES.get(basis.covariate, ("",))[-1]
+    unit = _UNITS.get(basis.covariate, plain)
     size, low, high = np.abs(found.size) if found.kind == "line" else found.size
     told = f"{size:.3g} {of} (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
     span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
