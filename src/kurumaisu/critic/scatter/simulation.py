@@ -58,10 +58,9 @@ class ScatterSimulator:
     def touched(self, setting: EffectSetting) -> tuple[float, float]:
         """Return which shares of the readings an effect takes away, and makes others."""
         (without, _), (left, _) = self.scans((), 0), self.scans((setting,), 0)
-        there, both = np.isfinite(without), np.isfinite(without) & np.isfinite(left)
-        other = both & (np.nan_to_num(without) != np.nan_to_num(left))
-        lost, moved = np.count_nonzero(there & ~both), np.count_nonzero(other)
-        return lost / max(np.count_nonzero(there), 1), moved / max(np.count_nonzero(there), 1)
+        there, still = np.isfinite(without), np.isfinite(left)
+        count = max(np.count_nonzero(there), 1)
+        return np.count_nonzero(there & ~still) / count, np.count_nonzero(there & still & (without != left)) / count
 
     def _simulated(self, settings: Sequence[EffectSetting], seed: int, off: FloatArray) -> FloatArray:
         """Return the statistics of readings that are off (k, b) [m] from where they are expected."""
