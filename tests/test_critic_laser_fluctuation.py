@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What differs from scan to scan is noise; what all scans of a stand share is a miss of something, and no scatter."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,6 @@ from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise,
 from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
-from kurumaisu.critic.ranges.signals.coefficient_blocks import _curves
 from kurumaisu.critic.scatter.scan_fit import fluctuating
 from kurumaisu.critic.scatter.statistics import Statistics
 from kurumaisu.params import load_model, shipped
@@ -81,19 +78,6 @@ def test_how_far_readings_scatter_is_what_no_beam_keeps(stands, kept, told):
     name = "spread of the means per beam"
     assert (moved[name] - plain[name] > 0.8) == kept  # what scatters spreads them by no more than it does by chance
     assert abs(moved[name] - plain[name]) < 0.3 or kept
-
-
-def test_a_curve_over_the_time_jumps_where_all_readings_do(stands):
-    shots, times = stands.shots, stands.shots.stamps
-    stand = np.flatnonzero(stands.layout.stand == 3)
-    measured = shots.measured + 0.002 * (np.arange(len(times)) > stand[3])[:, np.newaxis]
-    knots = {
-        free.basis.covariate: free.basis.knots
-        for free, _ in _curves(replace(shots, measured=measured), stands.marks)
-        if free.whole
-    }
-    assert {times[stand[3]], times[stand[4]]} <= set(knots["time"])
-    assert len(knots["heading"]) < len(knots["time"])  # stands that jump have the one heading still
 
 
 def test_of_scans_that_stand_alone_goes_what_beams_keep_in_all_of_them():

@@ -72,18 +72,18 @@ def test_a_cut_off_just_inside_the_range_is_saturation(tmp_path):
     assert finding.causes[0].parameters["inverse_far"].estimate == pytest.approx(1 / 3.96, rel=0.002)
 
 
-@pytest.mark.parametrize("lost", [False, True])
-def test_a_laser_that_sees_less_far_is_saturation(tmp_path, lost):
+@pytest.mark.parametrize(("end", "lost"), [(3.2, False), (3.2, True), (3.95, True)])
+def test_a_laser_that_sees_less_far_is_saturation(tmp_path, end, lost):
     """Walls beyond have no reading, or are read where it ends, as far off as any reading."""
     data = recording(tmp_path, None, 0.0, 7, scans=30)
     (run,) = data.runs
     noise = 0.003 * np.random.default_rng(7).standard_normal(run.scan.values.shape)
-    beyond = np.isfinite(run.scan.values) & (run.scan.values > 3.2)
-    there = np.where(beyond, np.inf if lost else np.round(3.2 + noise, 3), run.scan.values)
+    beyond = np.isfinite(run.scan.values) & (run.scan.values > end)
+    there = np.where(beyond, np.inf if lost else np.round(end + noise, 3), run.scan.values)
     seen = replace(data, runs=(replace(run, scan=replace(run.scan, values=there)),))
     finding = criticise_scans(seen, MODEL, lambda _: None, IDS | {"laser.saturation"})
     assert [cause.id for cause in finding.causes] == ["laser.saturation"]
-    assert finding.causes[0].parameters["inverse_far"].estimate == pytest.approx(1 / 3.2, rel=0.005)
+    assert finding.causes[0].parameters["inverse_far"].estimate == pytest.approx(1 / end, rel=0.005)
     (setting,) = [one for one in finding.settings if one.id == "laser.saturation"]
     assert setting.parameters["lost"] == float(lost)
 

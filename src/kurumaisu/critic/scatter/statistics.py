@@ -12,7 +12,7 @@ import numpy as np
 from kurumaisu.critic.ranges.noise.reading_noise import ELSEWHERE
 from kurumaisu.critic.ranges.noise.shared_errors import ScanNoise
 from kurumaisu.critic.ranges.scans.beams import hits_of
-from kurumaisu.critic.ranges.scans.valid_readings import GATE, PILED, cut_offs, inside_ends, without_cut_off
+from kurumaisu.critic.ranges.scans.valid_readings import PILED, cut_offs, inside_ends, without_cut_off
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import MATTERS, StatisticKinds
 from kurumaisu.critic.scatter.scan_fit import ScanFit, basis_of, drawn_errors, fluctuating, steepest
@@ -199,7 +199,7 @@ class Statistics:
         (low, high), (least, greatest) = cut_offs(readings[self._read], self._base[self._read])
         said = readings[self._read & np.isfinite(readings)]
         farthest = float(said.max()) if len(said) else np.inf
-        beyond = np.isinf(readings[self._read & (self._base > farthest + GATE)])
+        beyond = np.isinf(readings[self._read & (self._base > farthest + _WITHIN * (self._sd + self._reach))])
         lost = len(beyond) >= PILED and beyond.mean() > _ALL
         if lost and not np.isfinite(high):
             return (low, farthest), (least, farthest)

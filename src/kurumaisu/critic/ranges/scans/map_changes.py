@@ -14,6 +14,7 @@ from kurumaisu.critic.ranges.scans.valid_readings import without_cut_off
 from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL
 from kurumaisu.critic.values.verdict import Unknown
 from kurumaisu.geometry import wrap
+from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 _CELL = 0.5  # [m] of the map
@@ -29,7 +30,8 @@ _NEARER = 0.25  # [m] than the map, and from all that it has nearby: an error of
 _FEWEST = 4  # neighbouring beams: light of others and tails of the noise do not agree on where something is
 _SMOOTH = 0.1  # [m] between neighbours on one thing
 _WIDEST = 1.2  # [m] of a thing: what is wider, such as the floor before a tilted laser, is none
-_CLOSE = 0.1  # [m] before a wall, where poses are known by the scans: more than noise and what bends readings do
+_CLOSE = 0.05  # [m] before a wall, where poses are known by the scans: more than what bends readings does,
+_BEYOND_NOISE = 5.0  # and sds by which readings are off the map anyway
 _ON = 0.67  # share of the other readings of a place, and of a beam, that are nearer the map than that
 _OTHERS = 4  # times as many of them as are off in the scan, at least
 _MARGIN = 3  # beams on each side that may meet the thing in part
@@ -217,14 +219,15 @@ def _close(sights: Sights) -> BoolArray:
     out, known = np.zeros(nearer.shape, dtype=bool), np.isfinite(nearer)
     if not known.any():
         return out
+    least = max(_CLOSE, _BEYOND_NOISE * SIGMA_PER_MAD * float(np.median(np.abs(nearer[known]))))
     with np.errstate(invalid="ignore"):
-        off = nearer > _CLOSE
-        too_far = list(_runs(sights.measured, -nearer > _CLOSE))
+        off = nearer > least
+        too_far = list(_runs(sights.measured, -nearer > least))
     _, cell = np.unique(np.floor(sights.ends(sights.expected)[known] / _SPOT), axis=0, return_inverse=True)
     place = np.full(nearer.shape, -1)
     place[known] = cell.ravel()
-    met, missed = np.bincount(place[known]), np.bincount(place[known], np.abs(nearer[known]) > _CLOSE)
-    beams, astray = known.sum(axis=0), (known & (np.abs(nearer) > _CLOSE)).sum(axis=0)
+    met, missed = np.bincount(place[known]), np.bincount(place[known], np.abs(nearer[known]) > least)
+    beams, astray = known.sum(axis=0), (known & (np.abs(nearer) > least)).sum(axis=0)
 
     def mostly_on(seen: IntArray, wrong: FloatArray, own: int) -> bool:
         others = int(seen.sum()) - own

@@ -15,15 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu import effects
-from kurumaisu.critic.ranges.poses.pose_corrections import stands_of
 from kurumaisu.critic.ranges.scans.beams import RATES, BeamHits, Shots
 from kurumaisu.critic.ranges.scans.walls import Rays
 from kurumaisu.critic.ranges.signals.effect_columns import STEP, EffectColumns
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of
 from kurumaisu.effects import Echoes, Parameter
 from kurumaisu.geometry import wrap
-from kurumaisu.robust import SIGMA_PER_MAD
-from kurumaisu.types import BoolArray, FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray
 
 _HATS, _POSE_HATS = 14, 8  # of curves of the readings, and of the laser's pose
 _PAUSE = 5.0  # [s] between scans, which makes two stops of what was one
@@ -32,10 +30,6 @@ _DRAWS = 150  # coefficients of an effect that are still told one by one; of mor
 _ROUNDING = 1e-6
 _LEAST = 0.3  # [m, rad, s] spread of a covariate that a curve may follow
 _SAMPLES = 20000  # readings that say how often a covariate has which value
-_FEWEST = 6  # scans of a stand that may be split
-_SURE = 6.0  # sds that the two parts of a stand are apart, at least
-_ODD = 3.0  # times as far apart as those of other stands: what wanders has all of them look as if they jumped
-_MOST = 3  # stands that are split: of more, it is noise
 
 
 @dataclass(frozen=True)
@@ -135,11 +129,9 @@ def _slope(shots: Shots, ranges: FloatArray) -> FloatArray:
 
 def _curves(shots: Shots, marks: EffectColumns) -> Iterator[tuple[Block, FloatArray]]:
     known = np.isfinite(marks.base)
-    stand = stands_of(shots)
-    jumped = level_jumps(np.where(np.isfinite(shots.measured), shots.measured, np.nan) - marks.base, stand)
     for name, at in covariates(shots, marks.seen).items():
         whole = bool((np.ptp(at, axis=1) <= _ROUNDING).mean() > 0.5) or name == "heading"
-        basis = _basis(name, at, known, shots, (stand, jumped) if whole else None)
+        basis = _basis(name, at, known, shots, whole=whole)
         if basis is not None:
             columns = basis.matrix(at.ravel()).reshape(*at.shape, len(basis.knots))
             yield Block(effects.smooth_range_id(name), None, basis, basis.priors, slice(0), whole), columns
@@ -156,7 +148,7 @@ def pose_curves(shots: Shots, marks: EffectColumns, poses: FloatArray) -> Iterat
     for axis, which in enumerate((("x", "y"), ("x", "y"), (*RATES, "heading", "x", "y"))):
         for name in which:
             at = {**follow, **rates}[name]
-            basis = _basis(name, at, known, shots, None, _POSE_HATS)
+            basis = _basis(name, at, known, shots, _POSE_HATS)
             if basis is not None:
                 columns = basis.matrix(at.ravel()).reshape(*at.shape, len(basis.knots)) * poses[:, :, axis, np.newaxis]
                 # A reference that wanders is an error of its own: only what is faster than that is none of its noise.
@@ -165,28 +157,22 @@ def pose_curves(shots: Shots, marks: EffectColumns, poses: FloatArray) -> Iterat
 
 
 def _basis(
-    name: str,
-    at: FloatArray,
-    known: BoolArray,
-    shots: Shots,
-    stands: tuple[IntArray, IntArray] | None,
-    hats: int = _HATS,
+    name: str, at: FloatArray, known: BoolArray, shots: Shots, hats: int = _HATS, *, whole: bool = False
 ) -> Basis | None:
     """Return the curves over a quantity at (k, b) of the beams, None where it hardly varies.
 
-    stands: which stand each scan is of, and where its level jumps, of a quantity that is one for a whole scan.
+    whole: the quantity is one for a whole scan.
     """
     values = at[known]
     if not np.isfinite(values).all() or np.ptp(values) <= (0.0 if name in shots.known else _LEAST):
         return None
     few = values[:: max(len(values) // _SAMPLES, 1)]
-    knots = _knots(few if stands is None else at[:, 0], hats)
+    knots = _knots(at[:, 0] if whole else few, hats)
     if len(knots) < 3:
         return None
-    knots, places = (knots, knots) if stands is None else knots_parted(knots, at[:, 0], *stands)
     matrix = np.column_stack([np.interp(few, knots, row) for row in np.eye(len(knots))])
     low, high = np.quantile(few, [0.025, 0.975])
-    return Basis(name, knots, {}, tuple(priors_of(places, matrix)), float(low), float(high))
+    return Basis(name, knots, {}, tuple(priors_of(knots, matrix)), float(low), float(high))
 
 
 def covariates(shots: Shots, seen: BeamHits) -> dict[str, FloatArray]:
@@ -212,53 +198,3 @@ def _knots(values: FloatArray, hats: int) -> FloatArray:
     if 3 <= len(groups) <= _STOPS and sum(float(np.ptp(group)) for group in groups) < 0.1 * float(np.ptp(ordered)):
         return np.array([group.mean() for group in groups])
     return knots_of(values, hats)
-
-
-def level_jumps(off: FloatArray, stand: IntArray) -> IntArray:
-    """Return the scans (n,) after which the others of the same stand are read otherwise.
-
-    off (k, b) [m]: by how much readings are off, nan where there is none; stand (k,): of each scan, else -1.
-    """
-    rows = [np.flatnonzero(stand == one) for one in np.unique(stand[stand >= 0])]
-    levels = {int(own[0]): (own, _levels(off[own])) for own in rows if len(own) >= _FEWEST}
-    steps = np.concatenate([np.empty(0), *(np.abs(np.diff(level)) for _, level in levels.values())])
-    steps = steps[np.isfinite(steps)]
-    if not len(steps):
-        return np.empty(0, dtype=np.int64)
-    noise = max(SIGMA_PER_MAD * float(np.median(steps)) / np.sqrt(2), 1e-6)
-    found = [(z / noise, int(own[at])) for own, level in levels.values() for z, at in [_split(level)]]
-    least = max(_SURE, _ODD * float(np.median([z for z, _ in found])))
-    return np.array(sorted(row for z, row in sorted(found, reverse=True)[:_MOST] if z > least), dtype=np.int64)
-
-
-def knots_parted(knots: FloatArray, at: FloatArray, stand: IntArray, jumped: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Return the knots of a curve over what scans have (k,) with those of some stands parted, and their places.
-
-    jumped: scans after which a stand is parted. By its places a curve is as free from one part to the other as from
-    knot to knot elsewhere.
-    """
-    apart = float(np.median(np.diff(knots)))
-    jumped = jumped[at[jumped + 1] > at[jumped]]
-    for row in jumped.tolist():
-        own = at[stand == stand[row]]
-        knots = np.union1d(knots[(knots < own.min()) | (knots > own.max())], at[[row, row + 1]])
-    gaps = np.diff(knots)
-    ends = np.isin(knots[:-1], at[jumped]) & np.isin(knots[1:], at[jumped + 1])
-    return knots, knots[0] + np.concatenate([[0.0], np.cumsum(np.where(ends, apart, gaps))])
-
-
-def _levels(off: FloatArray) -> FloatArray:
-    """Return by how much all readings of each scan (n,) of a stand are off its mean; nan where none is known."""
-    seen = np.isfinite(off)
-    mean = np.where(seen, off, 0.0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    return np.array(
-        [np.median(row[known]) if known.any() else np.nan for row, known in zip(off - mean, seen, strict=True)]
-    )
-
-
-def _split(level: FloatArray) -> tuple[float, int]:
-    """Return how far apart the two parts of a stand are at most, in units of the noise, and the last scan of one."""
-    ahead = np.arange(1, len(level))
-    parts = np.cumsum(level)[:-1] / ahead, np.cumsum(level[::-1])[:-1][::-1] / ahead[::-1]
-    z = np.nan_to_num(np.abs(parts[1] - parts[0]) / np.sqrt(1 / ahead + 1 / ahead[::-1]))
-    return float(z.max()), int(z.argmax())
