@@ -58,8 +58,8 @@ def full_story():
         ),
         rivals=(Alternative("base.delay", -6.1, "fits worse by 6.1 nats"),),
         noise=(
-            NoiseParameter("heading", 0.0049, 0.0041, 0.0057, "rad"),
-            NoiseParameter("tau", 0.3, float("nan"), float("nan"), "s"),
+            NoiseParameter("heading", 0.0049, "rad"),
+            NoiseParameter("tau", 0.3, "s"),
         ),
         unexplained=("Nothing that these drives show.",),
         next_drive="Spin both ways.",

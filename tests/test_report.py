@@ -71,7 +71,7 @@ def test_the_page_says_what_verdict_and_story_hold(tmp_path):
         "400 times",
         "Error after 10 s: 0.424 m with the original model, 0.004 m with the extended one (rms).",
         "Drive next: Spin both ways.",
-        "4.10 to 5.70 mrad",
+        "4.90 mrad",
         "Nothing that these drives show.",
         "Spin both ways.",
         "Reference pose: measured.",

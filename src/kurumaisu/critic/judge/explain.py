@@ -193,7 +193,7 @@ def _noise(problem: Problem) -> tuple[NoiseParameter, ...]:
             ("reference heading, slowly varying part", n.lasting * n.heading_sd, "rad"),
             ("time constant of the slowly varying part", n.lasting_tau, "s"),
         )
-    return tuple(NoiseParameter(name, value, float("nan"), float("nan"), unit) for name, value, unit in rows)
+    return tuple(NoiseParameter(*row) for row in rows)
 
 
 def _story(recording: Recording, model: Model) -> Story:

@@ -114,12 +114,10 @@ class Alternative:
 
 @dataclass(frozen=True)
 class NoiseParameter:
-    """One estimated parameter of the noise with its 90 % interval, nan where it has none."""
+    """One estimated parameter of the noise."""
 
     name: str
     estimate: float
-    lo90: float
-    hi90: float
     unit: str
 
 

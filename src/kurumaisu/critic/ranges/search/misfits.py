@@ -17,7 +17,6 @@ from kurumaisu.types import FloatArray, IntArray
 _SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off
 _ALTERNATIVES = 6
 _LEAST = 1e-6  # [m], [rad] sd of an error that is none
-_NAN = float("nan")
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def noise_rows(normal: NormalEquations) -> tuple[NoiseParameter, ...]:
         ("reference position at the scans, each axis", position_sd, "m"),
         ("reference heading at the scans", heading_sd, "rad"),
     )
-    return tuple(NoiseParameter(name, value, _NAN, _NAN, unit) for name, value, unit in rows)
+    return tuple(NoiseParameter(*row) for row in rows)
 
 
 def _misfit(name: str, over: Mapping[str, tuple[str, FloatArray]], left: FloatArray, added: FloatArray) -> Misfit:
