@@ -55,6 +55,19 @@ def test_channels_are_swapped_only_if_neither_follows_its_own(turns, crossed, sw
     assert match.swapped == swapped
 
 
+@pytest.mark.parametrize(("early", "scale", "words"), [(0.8, 0.0, 1), (0.0, 0.008, 0), (0.0, -0.008, 0), (0.1, 0.0, 0)])
+def test_a_clock_that_is_off_from_the_outset_is_no_slow_one(early, scale, words):
+    """Later on, a lead of a second may be a clock's pace, which the catalogue has."""
+    rng = np.random.default_rng(7)
+    t = np.arange(0.0, 240.0, rates.STEP)
+    asked = np.repeat(rng.uniform(-0.5, 0.5, (60, 2)), 40, axis=0)
+    at = (t + early) * (1 + scale)
+    driven = np.column_stack([np.interp(at, t, column) for column in asked.T]) + rng.normal(0, 0.05, asked.shape)
+    found = input_match.compare(rates.Rates(t, asked), rates.Rates(t, driven), "command", first=True)
+    assert len(found.words) == words
+    assert not input_match.compare(rates.Rates(t, asked), rates.Rates(t, driven), "command").words
+
+
 def test_poses_that_are_missing_are_not_late():
     rng = np.random.default_rng(8)
     tables = drives.make(case(None, 0.0), rng)

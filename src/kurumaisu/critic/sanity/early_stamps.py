@@ -18,8 +18,8 @@ from kurumaisu.critic.values.criticism import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
 
-_LONGEST = 0.3  # [s] that is looked for: more shows at first sight
-_TRIED = (0.01, 0.02, 0.04, 0.08, 0.16, _LONGEST)  # [s] first
+_LONGEST = 0.6  # [s] that is looked for: more shows at first sight
+_TRIED = (0.01, 0.02, 0.04, 0.08, 0.16, 0.3, _LONGEST)  # [s] first
 _HOPE = 10.0  # [nat] that it must explain by itself to be looked at
 _WIN = 8.0  # [nat], as far as they are believed, by which clocks must beat what the chair may do
 _TASTE = 1.25  # periods: nobody knows a lead quite

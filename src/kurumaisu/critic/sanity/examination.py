@@ -37,8 +37,9 @@ def examine(recording: Recording, model: Model) -> Faults:
     segments = load_world(recording.world).segments if compared and recording.world is not None else None
     laser = _mounted(recording, model)
     told = []
+    begun = min((run.pose.t[0] for run in recording.runs if run.pose is not None and len(run.pose.t)), default=0.0)
     for run in recording.runs:
-        words = _of_run(run, model)
+        words = _of_run(run, model, first=run.pose is not None and begun in run.pose.t[:1])
         told += [(run, line) for line in [*words, *_of_scans(run, laser, model, None if words else segments)]]
     late = [line.startswith(map_agreement.CLOCKS) for _, line in told]
     if any(late) and laser is not None and segments is not None:
@@ -89,7 +90,8 @@ def _mean_error(model: Model) -> FloatArray:
     return np.array([ends[1] - ends[0], ends[0]])
 
 
-def _of_run(run: Run, model: Model) -> list[str]:
+def _of_run(run: Run, model: Model, *, first: bool) -> list[str]:
+    """Return what is wrong with a run, in words; first: of all drives."""
     wrong = units.untimely(run) or units.endless(run)
     if wrong or run.pose is None or len(run.pose.t) < 3:
         return wrong
@@ -104,7 +106,7 @@ def _of_run(run: Run, model: Model) -> list[str]:
         if name == "voltage":
             t, v, w = from_voltages(run, model)
             asked = of_input(t, np.column_stack([v, w]), rates[1].t)
-        plain = input_match.compare(asked, rates[1], name)
+        plain = input_match.compare(asked, rates[1], name, first=first)
         match = units.match(run, name, plain, rates[1], model) if name != "odometry" else plain
         known.append((name, match, _number(*rates)))
         follows[name] = plain.correlation

@@ -22,6 +22,7 @@ _LONGEST = 120.0  # [s] shifts of clocks that are tried
 _SCALES = np.exp(np.linspace(np.log(0.4), np.log(2.5), 185))  # of one clock against the other, in steps of 1 %
 _SCALE = 0.05  # clocks may differ by this share
 _PIECES = 240.0  # [s] of a drive that are compared
+_OUTSET = 60.0  # [s] of the first drive likewise: clocks that were set together are together still
 _FEWEST_TURNS = 12  # changes of the input below which nearly any pace of the clocks would do
 _PIECE = 100.0  # [s] of the drive that the scales are tried on
 _ALIKE = 0.7  # least correlation of a reading that is said
@@ -61,9 +62,14 @@ class Match:
     words: tuple[str, ...]
 
 
-def compare(asked: Rates, driven: Rates, name: str) -> Match:
-    """Return how the motion follows an input of a name, and in words what is wrong with either."""
-    asked, driven = _beginning(asked, driven)
+def compare(asked: Rates, driven: Rates, name: str, *, longest: float = _PIECES, first: bool = False) -> Match:
+    """Return how the motion follows an input of a name, and in words what is wrong with either.
+
+    longest: of what is compared [s]; first: of all drives, at whose beginning no clock has drifted yet.
+    """
+    if first and (begun := compare(asked, driven, name, longest=_OUTSET)).lag < _EARLY:
+        return begun
+    asked, driven = _beginning(asked, driven, longest)
     drift = _DRIFT * float(driven.t[-1] - driven.t[0])
     pairs = _pairs(asked.values, driven.values)
     lags = pairs[0][0].lags
@@ -89,11 +95,11 @@ def compare(asked: Rates, driven: Rates, name: str) -> Match:
     return Match(*match, words=tuple(words))
 
 
-def _beginning(asked: Rates, driven: Rates) -> tuple[Rates, Rates]:
+def _beginning(asked: Rates, driven: Rates, longest: float) -> tuple[Rates, Rates]:
     """Return the first minutes in which something was asked for: later on, clocks may have drifted apart."""
     size = np.nan_to_num(np.abs(asked.values)).sum(axis=1) * np.isfinite(driven.values).all(axis=1)
     started = int(np.argmax(size > 0.3 * size.max(initial=0.0)))
-    piece = slice(max(0, started - round(30 / STEP)), started + round(_PIECES / STEP))
+    piece = slice(max(0, started - round(30 / STEP)), started + round(longest / STEP))
     return Rates(asked.t[piece], asked.values[piece]), Rates(driven.t[piece], driven.values[piece])
 
 
