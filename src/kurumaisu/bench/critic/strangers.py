@@ -144,7 +144,8 @@ def _case(job: Job) -> Case:
     truth = json.loads((where / "truth.json").read_text(encoding="utf-8"))
     start = cpu_time()
     try:
-        found = pipeline.criticise(read_recording(where / "recording"), shipped("launch/md100.yaml"), lambda _: None)
+        recording = read_recording(where / "recording")
+        found = pipeline.criticise(recording, recording.model or shipped("launch/md100.yaml"), lambda _: None)
     except Error:
         return Case(truth, None, None, worse=False, cpu=cpu_time() - start)
     gain, worse = _gained(where / "answers.csv", found)
