@@ -20,7 +20,6 @@ NAMES = [i for i in EFFECTS if not i.startswith("unknown")]
 DULL = [
     ("base.gain_v", "straight"),
     ("base.gain_w", "left"),
-    ("base.veer", "straight"),
     ("base.gain_v", "circle"),
     ("base.curvature_v", "straight"),
     ("base.left_right_gain", "left"),
@@ -32,7 +31,6 @@ DULL = [
     ("base.gain_w", "circle"),
     ("base.dead_zone_w", "spin"),
     ("base.dac_zero_f", "straight"),
-    ("base.marker_yaw", "straight"),
     ("base.gain_w", "spin"),
 ]
 

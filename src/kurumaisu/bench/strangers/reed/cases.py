@@ -31,7 +31,6 @@ DULL: list[tuple[str, list[tuple[float, float]]]] = [
     ("base.gain_w", [(0.0, 0.6), (0.0, 0.3), (0.0, 0.0)]),
     ("base.understeer", [(0.4, 0.3), (0.4, -0.3)]),
     ("base.cross_w_to_v", [(0.3, 0.4), (0.3, -0.3), (0.0, 0.5), (-0.2, -0.4), (0.0, 0.0)]),
-    ("base.veer", [(0.3, 0.0), (0.0, 0.0)]),
     ("base.gain_w", [(0.3, 0.4)]),
     ("base.curvature_v", [(0.5, 0.0), (0.0, 0.0)]),
     ("base.dead_zone_v", [(0.25, 0.0), (0.0, 0.0)]),
