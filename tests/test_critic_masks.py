@@ -8,6 +8,8 @@ import pytest
 from phased_drive import phased, recorded
 
 from kurumaisu.critic.sanity import examination, masks
+from kurumaisu.critic.sanity import rows as sanity_rows
+from kurumaisu.critic.values.recording import Series
 from kurumaisu.params import load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -51,6 +53,25 @@ def test_an_excursion_of_a_second_is_set_aside(seed, start):
     pose, (told,) = judged(run)
     assert_without(pose, run, rows)
     assert f"off at t = {start + 25.01:.2f} s to {start + 25.96:.2f} s: 20 of its 1200 rows set aside" in told
+
+
+def test_rows_that_repeat_the_one_before_while_the_robot_moves_are_set_aside():
+    run = phased(np.random.default_rng(2))
+    values = run.pose.values.copy()
+    moving, resting = 150, 350  # in a curve, and at a stand
+    for row in (moving, resting):
+        values[row + 1 : row + 4] = values[row]
+    run = replace(run, pose=replace(run.pose, values=values))
+    pose, (told,) = judged(run)
+    assert_without(pose, run, np.arange(moving + 1, moving + 4))
+    assert f"repeats itself while the robot moves at t = {run.pose.t[moving + 1]:.2f}" in told
+
+
+def test_a_reference_without_noise_that_stops_and_goes_repeats_nothing():
+    t = np.arange(0.0, 40.0, 0.05)
+    x = np.cumsum(0.05 * np.where(t % 2 < 1.2, 0.4, 0.0))
+    pose = Series(t, np.column_stack([x, 0 * x, 0 * x]), ("x", "y", "theta"))
+    assert not sanity_rows.stale(pose).any()
 
 
 @pytest.mark.parametrize("rows", [[500, 502], [500, 502, 504], [500, 503], [500, 501], [500, 501, 503]])

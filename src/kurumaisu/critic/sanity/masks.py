@@ -17,7 +17,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, prepare
 from kurumaisu.critic.sanity import imu_match
 from kurumaisu.critic.sanity.pose_jumps import jumps
-from kurumaisu.critic.sanity.rows import stretches
+from kurumaisu.critic.sanity.rows import stale, stretches
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.robust import third_difference_sd
@@ -82,16 +82,19 @@ def _told_contacts(run: Run, spans: Sequence[tuple[float, float]]) -> str:
 
 
 def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
-    pose = run.pose
-    if pose is None or run.pose_source != "measured":
+    if run.pose is None or run.pose_source != "measured":
         return run, []
+    pose, words = _fresh(run.name, run.pose)
+    run = replace(run, pose=pose)
     spans = _elsewhere(pose, run.command)
     off = np.zeros(len(pose.t), dtype=np.bool_)
     for first, end, _ in spans:
         off[first:end] = True
     if off.mean() > _MOST:
-        return run, []
-    kept, words = (replace(run, pose=pose.rows(~off)), [_told(run.name, pose, spans, off)]) if spans else (run, [])
+        return run, words
+    if spans:
+        words.append(_told(run.name, pose, spans, off))
+    kept = replace(run, pose=pose.rows(~off)) if spans else run
     assert kept.pose is not None
     brief = brief_errors(kept, model)
     if not brief.any() or brief.mean() > _MOST:
@@ -99,6 +102,15 @@ def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
     begun = moment(float(kept.pose.t[int(np.argmax(brief))]))
     more = f"{run.name}: the reference is off for a moment at t = {begun}: {_rows(brief)}"
     return replace(kept, pose=kept.pose.rows(~brief)), [*words, more]
+
+
+def _fresh(name: str, pose: Series) -> tuple[Series, list[str]]:
+    """Return a reference without rows that are older than they say, if these are few, and words for them."""
+    old = stale(pose)
+    if not old.any() or old.mean() > _MOST:
+        return pose, []
+    begun = moment(float(pose.t[int(np.argmax(old))]))
+    return pose.rows(~old), [f"{name}: the reference repeats itself while the robot moves at t = {begun}: {_rows(old)}"]
 
 
 def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:

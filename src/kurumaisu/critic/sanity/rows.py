@@ -21,6 +21,7 @@ _REPEATS = 3.0
 # Every row twice is such a reference; some rows twice is a buffer that was stuck.
 _SOME_TWICE = (1.04, 1.7)
 MOVING = 0.05  # [m/s, rad/s] above this a robot is on its way
+_GOES_ON = 0.7  # share of its speed behind rows that repeat, from which it moved meanwhile, too
 _FEW = 0.01  # share of readings that are valid, below which nothing was measured
 _STUCK = 0.5  # share of scans that equal the one before while the robot moves
 _PILED = 0.01  # share of readings that are exactly the largest one, from which it is no distance
@@ -73,6 +74,26 @@ def stretches(flags: BoolArray) -> tuple[IntArray, IntArray]:
     """Return first and last row of every stretch of rows that are equal."""
     edges = np.diff(np.r_[False, flags, False].astype(int))
     return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+
+
+def stale(pose: Series) -> BoolArray:
+    """Return which rows (n,) only repeat the one before, to the last bit, while the robot goes on as behind them.
+
+    A robot that stood begins to move when it does so: behind a reference that was stuck it is elsewhere at once.
+    """
+    out = np.zeros(len(pose.t), dtype=np.bool_)
+    for a, b in zip(*stretches(_still(pose)), strict=True):
+        after = int(np.searchsorted(pose.t, 2 * pose.t[min(b + 1, len(out) - 1)] - pose.t[a]))
+        if b + 1 < after < len(out):
+            meanwhile, then = (_speed(pose, *ends) for ends in ((a, b + 1), (b + 1, after)))
+            out[a + 1 : b + 1] = bool(((meanwhile > MOVING) & (meanwhile > _GOES_ON * then)).any())
+    return out
+
+
+def _speed(pose: Series, first: int, last: int) -> FloatArray:
+    """Return the mean speeds (2,) [m/s, rad/s] from a row to another."""
+    way = geometry.between(pose.values[first, :3], pose.values[last, :3])
+    return np.asarray(np.array([np.hypot(way[0], way[1]), abs(way[2])]) / (pose.t[last] - pose.t[first]))
 
 
 def repeated(pose: Series, driven: Rates) -> str | None:
