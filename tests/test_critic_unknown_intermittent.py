@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What comes and goes is told with when it was, and is not taken for noise; noise, however loud, is not told."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from hidden_effect import Disturbance, recording
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.engine.evidence import Problem
+from kurumaisu.critic.judge import unresolved
+from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.unknown import intermittent
 from kurumaisu.params import load_model, shipped
@@ -54,6 +57,31 @@ def test_packets_that_are_lost_are_told_with_their_time():
 def test_noise_does_not_come_and_go(noise):
     found = criticised(recording(None, 0.0, 72, 40.0, noise))
     assert not [one for one in found.verdict.unknown if one.shape.startswith("comes and goes")]
+
+
+@pytest.mark.parametrize(
+    ("events", "told", "leads"), [("ab", 80.0, "a"), ("a", None, "b"), ("b", None, "a"), ("", None, "a")]
+)
+def test_an_equation_that_does_without_what_comes_and_goes_leads(monkeypatch, events, told, leads):
+    """Of a voltage that leaves its branch some converters make no turn, and others a wrong one, for moments."""
+
+    @dataclass(frozen=True)
+    class Found:
+        near: tuple[SimpleNamespace, ...]
+        enough = True
+
+        def led_by(self, fit):
+            return Found((fit, *(one for one in self.near if one is not fit)))
+
+    def beside(problem, drives, settings):
+        return SimpleNamespace(nats=80.0, share=0.05, size=1.0, channel="v_gain") if settings in tuple(events) else None
+
+    monkeypatch.setattr(unresolved, "intermittent", beside)
+    monkeypatch.setattr(unresolved, "_usual", lambda *_: 1.0)
+    made = Decision(SimpleNamespace(ids=None), Found(tuple(SimpleNamespace(settings=name) for name in "ab")), None)
+    made, one = unresolved.certain_intermittent(made, [])
+    assert (one and one.nats) == told
+    assert made.found.near[0].settings == leads
 
 
 def test_moments_that_share_a_column_say_what_they_say_alone(monkeypatch):

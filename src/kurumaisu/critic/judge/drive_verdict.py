@@ -65,7 +65,7 @@ def criticise_drives(
     test = [drive for name in recording.test for drive in drives.get(name, [])]
     made = decide(first, recording.truth, progress)
     # Where only turning was measured, places say what was asked for, in which nothing comes and goes.
-    going = None if not recording.placed else unresolved.certain_intermittent(made, [*train, *test])
+    made, going = unresolved.certain_intermittent(made, [*train, *test]) if recording.placed else (made, None)
     if going is not None:
         progress("judging what is left without the moments in which something comes and goes")
         train, test = [going.freed(drive) for drive in train], [going.freed(drive) for drive in test]

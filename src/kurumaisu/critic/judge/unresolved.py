@@ -37,6 +37,7 @@ _LOUDER = 1.5  # times the variance that the noise has, beyond which drives held
 _MISSED = 1.5  # times as far from where it came as noise alone would leave it, beyond which more must act
 _SURE = 0.99  # of the blocks drawn again
 _DRAWS = 500
+_FORMS = 8  # sets of effects beside which it is asked whether something comes and goes
 
 
 def with_unresolved(
@@ -93,15 +94,23 @@ def with_remainder(criticism: Criticism) -> Criticism:
     return replace(criticism, story=replace(story, headline=f"{story.headline} {words}"))
 
 
-def certain_intermittent(made: Decision, drives: Sequence[Drive]) -> Intermittent | None:
-    """Return what surely comes and goes in drives beside what was found, and matters; None where nothing does."""
+def certain_intermittent(made: Decision, drives: Sequence[Drive]) -> tuple[Decision, Intermittent | None]:
+    """Return what was found, and what surely comes and goes in drives beside it, and matters; None where nothing does.
+
+    Where it does so beside the likeliest set, and not beside one that is nearly as likely, an equation of another form
+    does without it, and leads.
+    """
     problem, found, extension = made.problem, made.found, made.extension
     if not found.enough or (problem.ids is not None and effects.SMOOTH not in problem.ids):
-        return None
-    one = intermittent(problem, drives, (found.best if extension is None else extension).settings)
-    if one is None or one.nats < CERTAIN or one.share * abs(one.size) < MATERIAL * _usual(problem, one.channel):
-        return None
-    return one
+        return made, None
+    first: Intermittent | None = None
+    sets = [fit.settings for fit in found.near[:_FORMS]] if extension is None else [extension.settings]
+    for settings, fit in zip(sets, found.near, strict=False):
+        one = intermittent(problem, drives, settings)
+        if one is None or one.nats < CERTAIN or one.share * abs(one.size) < MATERIAL * _usual(problem, one.channel):
+            return replace(made, found=found.led_by(fit)), None
+        first = first or one
+    return made, first
 
 
 def with_intermittent(criticism: Criticism, one: Intermittent | None) -> Criticism:

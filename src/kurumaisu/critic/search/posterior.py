@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -181,14 +181,22 @@ class SearchResult:
         return next(fit for fit in self.fits if not fit.candidates)
 
     @property
+    def near(self) -> tuple[Fit, ...]:
+        """Return all fits that are nearly as likely as the best one, which comes first."""
+        least = self.log_posterior(self.best) - _NEAR
+        return tuple(fit for fit in self.fits if self.log_posterior(fit) > least)
+
+    @property
     def likely(self) -> tuple[Fit, ...]:
         """Return the likeliest fits of some sets of effects, the best first: those that other noise may put first."""
-        least = self.log_posterior(self.best) - _NEAR
         of_set: dict[frozenset[str], Fit] = {}
-        for fit in self.fits:
-            if self.log_posterior(fit) > least:
-                of_set.setdefault(fit.ids, fit)
+        for fit in self.near:
+            of_set.setdefault(fit.ids, fit)
         return tuple(of_set.values())[:_LIKELY]
+
+    def led_by(self, fit: Fit) -> SearchResult:
+        """Return the same with one of the fits as the best, for which something speaks that the search did not ask."""
+        return replace(self, fits=(fit, *(one for one in self.fits if one is not fit)))
 
     def nats(self, fit: Fit) -> float:
         """Return the evidence [nat] of a set over nothing, none where data are too few to believe in it."""
