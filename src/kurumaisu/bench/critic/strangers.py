@@ -121,6 +121,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     cases: dict[str, list[Case]] = {generator: [] for generator in options.generators}
     with ProcessPoolExecutor(options.jobs) as pool:
         for job, case in zip(jobs, pool.map(_case, jobs), strict=True):
+            if case is None:
+                print(f"{job.generator}/{job.kind}-{job.seed}: could not be made")
+                continue
             cases[job.generator].append(case)
             if options.cases:
                 print(
@@ -135,12 +138,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _case(job: Job) -> Case:
-    """Make a recording if it is not there, and criticise it."""
+def _case(job: Job) -> Case | None:
+    """Make a recording if it is not there, and criticise it; None where its author's program finds no such case."""
     where = job.folder / job.generator / f"{job.kind}-{job.seed}"
     if not (where / "truth.json").exists():
         where.mkdir(parents=True, exist_ok=True)
-        import_module(f"kurumaisu.bench.strangers.{job.generator}").make(where, job.kind, job.seed)
+        try:
+            import_module(f"kurumaisu.bench.strangers.{job.generator}").make(where, job.kind, job.seed)
+        except RuntimeError:
+            return None
     truth = json.loads((where / "truth.json").read_text(encoding="utf-8"))
     start = cpu_time()
     try:
