@@ -78,7 +78,7 @@ class Case:
     @property
     def strong(self) -> bool:
         """Tell whether what is hidden shows as clearly as the floors ask for."""
-        least = _BESIDE if self.truth["kind"] in ("single", "form") else _BESIDE_OTHERS
+        least = {"single": _BESIDE, "form": _BESIDE, "confounded": 0.0}.get(self.truth["kind"], _BESIDE_OTHERS)
         return all(cause["z"] >= _Z and cause["beside"] >= least for cause in self.truth["causes"])
 
     @property
