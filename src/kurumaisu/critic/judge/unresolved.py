@@ -104,9 +104,8 @@ def certain_intermittent(made: Decision, drives: Sequence[Drive]) -> tuple[Decis
     if not found.enough or (problem.ids is not None and effects.SMOOTH not in problem.ids):
         return made, None
     first: Intermittent | None = None
-    sets = [fit.settings for fit in found.near[:_FORMS]] if extension is None else [extension.settings]
-    for settings, fit in zip(sets, found.near, strict=False):
-        one = intermittent(problem, drives, settings)
+    for fit in found.near[: _FORMS if extension is None else 1]:
+        one = intermittent(problem, drives, (fit if extension is None else extension).settings)
         if one is None or one.nats < CERTAIN or one.share * abs(one.size) < MATERIAL * _usual(problem, one.channel):
             return replace(made, found=found.led_by(fit)), None
         first = first or one

@@ -91,20 +91,10 @@ def _slope(s: State, k: float, h: Hidden) -> Out:
     return {"v": s.v - k * np.where((up < 0) & (h.form > 0), 0.6 * up, up) * np.sign(s.v) * (np.abs(s.v) > 0.01)}
 
 
-def _limit(a: Array, most: float, h: Hidden) -> Array:
-    """A current limit; other form: with a round knee."""
-    return a / (1 + (np.abs(a) / most) ** 6) ** (1 / 6) if h.form else np.clip(a, -most, most)
-
-
 def _sag(s: State, k: float, h: Hidden) -> Out:
     """Voltage falls by the time, or in other form by the way that was driven."""
     share = 1 - k * (np.cumsum(np.abs(s.v) + 0.3 * np.abs(s.w)) * DT / 0.3 if h.form else s.t)
     return {"v": s.v * share, "w": s.w * share}
-
-
-def _power(a: Array, usual: float, p: float, form: int) -> Array:
-    """One, or in other form a power of the rate against its usual size."""
-    return (np.abs(a) / usual) ** (p * form)
 
 
 def _clock(p: Any, k: float, h: Hidden) -> Out:

@@ -24,7 +24,6 @@ from kurumaisu.geometry import wrap
 from kurumaisu.types import BoolArray, FloatArray
 
 _HATS, _POSE_HATS = 14, 8  # of curves of the readings, and of the laser's pose
-_PAUSE = 5.0  # [s] between scans, which makes two stops of what was one
 _STOPS = 20  # stops of which each may have a knot of its own
 _DRAWS = 150  # coefficients of an effect that are still told one by one; of more, so many draws stand for all
 _ROUNDING = 1e-6
