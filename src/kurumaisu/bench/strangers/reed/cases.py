@@ -179,17 +179,17 @@ def resize(case: Case, rng: Rng) -> None:
             break
         for ride in case.rides:
             ride.pose = plan(rng, ride.drive, case.how, case.room, case.uses)
-    case.z = strength(case, lit)
 
 
 def judge(case: Case) -> None:
-    """What no other effect of the catalogue explains of each."""
+    """How clearly each shows in the end, and what no other effect of the catalogue explains of it."""
     base = [u for u in case.uses if u.effect.stage < 10]
+    lit = shine.light(case.fit, base, case.fan, case.room, case.noise) if case.fan else None
+    case.z = strength(case, lit)
     white = dict(zip([u.id for u in base], score.hidden(case.fit, base, case.noise), strict=True)) if base else {}
     rest = score.others(case.fit, score.candidates(case.how.robot, case.how.law), case.noise)
-    if case.fan:
-        lit = shine.light(case.fit, base, case.fan, case.room, case.noise)
-        none, tail = np.zeros(len(next(iter(rest.values())))), np.zeros(2 * lit.mask.size)
+    if lit:
+        none, tail = np.zeros(len(next(iter(rest.values())))), np.zeros(2 * lit.mask.size + 3 * len(lit.mask))
         for u in base:
             white[u.id] = np.concatenate([white[u.id], shine.vector(lit, u) if "marker" in u.id else tail])
         for name, column in rest.items():
