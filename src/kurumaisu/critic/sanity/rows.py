@@ -21,7 +21,7 @@ _REPEATS = 3.0
 # Every row twice is such a reference; some rows twice is a buffer that was stuck.
 _SOME_TWICE = (1.04, 1.7)
 MOVING = 0.05  # [m/s, rad/s] above this a robot is on its way
-_GOES_ON = 0.7  # share of its speed behind rows that repeat, from which it moved meanwhile, too
+_GOES_ON = 0.7  # share of the lower of its speeds around rows that repeat, from which it moved meanwhile, too
 _FEW = 0.01  # share of readings that are valid, below which nothing was measured
 _STUCK = 0.5  # share of scans that equal the one before while the robot moves
 _PILED = 0.01  # share of readings that are exactly the largest one, from which it is no distance
@@ -77,16 +77,18 @@ def stretches(flags: BoolArray) -> tuple[IntArray, IntArray]:
 
 
 def stale(pose: Series) -> BoolArray:
-    """Return which rows (n,) only repeat the one before, to the last bit, while the robot goes on as behind them.
+    """Return which rows (n,) only repeat the one before, to the last bit, while the robot goes on as around them.
 
     A robot that stood begins to move when it does so: behind a reference that was stuck it is elsewhere at once.
     """
     out = np.zeros(len(pose.t), dtype=np.bool_)
     for a, b in zip(*stretches(_still(pose)), strict=True):
-        after = int(np.searchsorted(pose.t, 2 * pose.t[min(b + 1, len(out) - 1)] - pose.t[a]))
-        if b + 1 < after < len(out):
-            meanwhile, then = (_speed(pose, *ends) for ends in ((a, b + 1), (b + 1, after)))
-            out[a + 1 : b + 1] = bool(((meanwhile > MOVING) & (meanwhile > _GOES_ON * then)).any())
+        lasts = pose.t[min(b + 1, len(out) - 1)] - pose.t[a]
+        before, after = np.searchsorted(pose.t, [pose.t[a] - lasts, pose.t[a] + 2 * lasts]).tolist()
+        if before < a and b + 1 < after < len(out):
+            first, meanwhile, then = (_speed(pose, *ends) for ends in ((before, a), (a, b + 1), (b + 1, after)))
+            goes_on = meanwhile > np.maximum(MOVING, _GOES_ON * np.minimum(first, then))
+            out[a + 1 : b + 1] = bool(goes_on.any())
     return out
 
 

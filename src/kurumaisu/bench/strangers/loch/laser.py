@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu.bench.strangers.loch.motion import MODEL, Array, Drive, Effect, Hidden, Path
+from kurumaisu.bench.strangers.tilt import tilted
 
 COLOURS = {"gray80": 0.9, "gray50": 0.5, "gray10": 0.15}
 CHAIR = ((-0.02, 0.36), (0.2, 0.36), (0.42, 0.36))
@@ -139,7 +140,7 @@ def _cast(s: Shot, poses: Array | None) -> None:
     p, about = s.path.at(s.t[:, None] + s.late[:, None] + s.sweep[None]), s.path.at(s.t) if poses is None else poses
     if poses is not None:
         p = _carried(s.path.at(s.t), poses, p)
-    c, n, bearing = np.cos(p[..., 2]), np.sin(p[..., 2]), s.fan.angles
+    c, n, (bearing, down) = np.cos(p[..., 2]), np.sin(p[..., 2]), tilted(s.fan.angles, s.pitch, s.roll)
     x, y, s.direction = p[..., 0] + c * s.x - n * s.y, p[..., 1] + n * s.x + c * s.y, p[..., 2] + s.yaw + bearing
     r, which = cast(s.walls, x, y, s.direction)
     ux, uy, dx, dy = np.cos(s.direction), np.sin(s.direction), s.walls.d[which, 0], s.walls.d[which, 1]
@@ -147,7 +148,6 @@ def _cast(s: Shot, poses: Array | None) -> None:
     s.cos, s.shine = np.abs(det) / np.hypot(dx, dy), s.walls.shine[which]
     turn = -(r * (dx * ux + dy * uy) + dy * (y - about[:, 1:2]) + dx * (x - about[:, :1])) / det
     s.by_pose = np.stack([dy / det, -dx / det, turn], axis=-1)
-    down = s.pitch * np.cos(bearing) + s.roll * np.sin(bearing)
     floor = np.where(down > 1e-6, MOUNT["z"] / np.sin(np.maximum(down, 1e-6)), np.inf)
     s.hit, s.r = np.where(r > floor, -1, which), np.minimum(r / np.cos(down), floor)
     s.hx, s.hy = x + s.r * ux, y + s.r * uy

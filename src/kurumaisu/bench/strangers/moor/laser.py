@@ -10,6 +10,7 @@ import numpy as np
 
 from kurumaisu.bench.strangers.moor.motion import Motion
 from kurumaisu.bench.strangers.moor.world import Array, Flags, Ints, Room
+from kurumaisu.bench.strangers.tilt import tilted
 
 SCALE, DATUM, SIGMA, NEAR, FAR = 1.004587, 0.058826, (0.002334, -0.000488, 0.000199), 0.06, 4.0
 HEIGHT = 0.4
@@ -117,10 +118,11 @@ def look(m: Motion, pose: PoseAt, stamps: Array, fan: Fan, room: Room, o: Optics
     if o.shrink or o.shift or o.turn:
         room = room.moved(np.random.default_rng(seed), o.shrink, o.shift, o.turn)
     ox, oy = x + np.cos(h) * o.x - np.sin(h) * o.y, y + np.sin(h) * o.x + np.cos(h) * o.y
-    angle = h + o.yaw + bearing
+    seen, below = tilted(bearing, o.pitch, -o.roll)
+    angle = h + o.yaw + seen
     r, incidence, face = room.cast(ox.ravel(), oy.ravel(), angle.ravel())
     r, incidence, face = r.reshape(t.shape), incidence.reshape(t.shape), face.reshape(t.shape)
-    down = np.sin(o.pitch) * np.cos(bearing) - np.sin(o.roll) * np.sin(bearing)
+    down = np.sin(below)
     with np.errstate(divide="ignore"):
         r = np.minimum(r / np.sqrt(1 - down**2), np.where(down > 0, HEIGHT / np.maximum(down, 1e-9), np.inf))
     dark = np.array([b.dark for b in room.boxes for _ in range(4)] + [False])[face] * 1.0

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.bench.strangers.tilt import tilted
+
 from .drive import Room
 from .plant import Array, Flags
 
@@ -93,9 +95,9 @@ def look(s: Scans, f: dict[str, float]) -> View:
             rate[c, i] = (np.interp(t[i] + 0.02, s.grid, s.pose[:, c, run]) - pose[c, i]) / 0.02
     c, q = np.cos(pose[2]), np.sin(pose[2])
     mx, my = MOUNT[0] + f.get("x", 0.0), MOUNT[1] + f.get("y", 0.0)
-    a = pose[2] + bearing + f.get("yaw", 0.0)
+    seen, down = tilted(bearing + np.zeros_like(t), f.get("pitch", 0.0), f.get("roll", 0.0))
+    a = pose[2] + seen + f.get("yaw", 0.0)
     r, tan, side = cast(pose[0] + mx * c - my * q, pose[1] + mx * q + my * c, a, s.room.segments(mapped(s.room, s, f)))
-    down = f.get("pitch", 0.0) * np.cos(bearing) + f.get("roll", 0.0) * np.sin(bearing) + 0 * r
     r = np.minimum(r / np.cos(down), np.where(down > 1e-3, HEIGHT / np.sin(np.maximum(down, 1e-3)), 1e3))
     jump = (np.diff(side, axis=1) != 0) & (np.abs(np.diff(r, axis=1)) > 0.04)
     edge = np.zeros(r.shape, bool)

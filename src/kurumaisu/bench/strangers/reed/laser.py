@@ -10,6 +10,7 @@ import numpy as np
 
 from kurumaisu.bench.strangers.reed.core import Array, Path, Use
 from kurumaisu.bench.strangers.reed.room import COLOURS, Room, cast
+from kurumaisu.bench.strangers.tilt import tilted
 
 SCALE, DATUM, SIGMA = 1.004587, 0.058826, (0.002334, -0.000488, 0.000199)
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -115,10 +116,10 @@ def view(
     if spread is not None:
         x, y, th = x + spread[:, :1], y + spread[:, 1:2], th + spread[:, 2:]
     ox, oy = x + fan.x * np.cos(th) - fan.y * np.sin(th), y + fan.x * np.sin(th) + fan.y * np.cos(th)
-    angle = th + fan.yaw + bearing
+    seen, down = tilted(bearing, s.pitch, s.roll)
+    angle = th + fan.yaw + seen
     o, d = np.stack([ox, oy], axis=2).reshape(-1, 2), np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(-1, 2)
     r, side, cosine = (a.reshape(t.shape) for a in cast(s.room.sides(), o, d))
-    down = s.pitch * np.cos(bearing) + s.roll * np.sin(bearing)
     level, floor = r / np.cos(down), np.where(down > 1e-3, HEIGHT / np.sin(np.maximum(down, 1e-3)), 99.0)
     side = np.where(floor < level, 998.0, side)
     shade = np.array([COLOURS[c] for c in s.room.colours])

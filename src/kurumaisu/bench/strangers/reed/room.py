@@ -46,7 +46,7 @@ class Room:
         for i, ((cx, cy, sx, sy, a), colour) in enumerate(zip(self.boxes.tolist(), self.colours, strict=True)):
             lines.append(
                 f'block ( name "block{i}" pose [{cx:.6f} {cy:.6f} 0 {np.degrees(a):.6f}] '
-                f'size [{sx:.6f} {sy:.6f} 2.0] color "{colour}" )'
+                f'size [{sx:.6f} {sy:.6f} 2.0] color "{colour}" ranger_return {COLOURS[colour]} )'
             )
         return "\n".join(lines) + "\n"
 

@@ -29,6 +29,7 @@ _PRUNED = 3  # best sets with a block that are pruned
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _NEAR = 30.0  # [nat] behind the likeliest, beyond which nobody asks what a curve draws
 _ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
+_ALIKE_OVER = float(np.sqrt(0.5))  # the same where both follow the same: half of what it does
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
 Families = Mapping[str, tuple[slice, FormFamily]]  # by effect: what its equation may miss, and where its columns are
@@ -134,7 +135,7 @@ def compare_blocks(
     rivals.sort(key=lambda rival: -rival.log_posterior)
     singles = [fit for fit in found.fits if len(fit.forms) == 1 and effects.by_id(fit.forms[0].id).empirical]
     near = rivals[0].log_posterior - _NEAR if rivals else 0.0
-    rivals = [replace(r, form_of=_form_of(r, singles, gram)) if r.log_posterior > near else r for r in rivals]
+    rivals = [replace(r, form_of=_form_of(r, singles, gram, families)) if r.log_posterior > near else r for r in rivals]
     plain = [(fit.ids, fit.score) for fit in found.fits]
     plain += [(rival.ids, rival.log_posterior) for rival in rivals if not rival.unknown]
     curved = [rival for rival in rivals if rival.unknown]
@@ -256,7 +257,7 @@ def fit_with_block(rival: SetWithBlock, gram: FloatArray) -> tuple[FittedForms, 
     return fit, at[n:], covariance[n:, n:]
 
 
-def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArray) -> str | None:
+def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArray, families: Families) -> str | None:
     """Return the effect whose signal a curve draws beside its set, None of none; singles: effects alone, fitted.
 
     A cause that follows another equation than the catalogue's is still that cause.
@@ -271,13 +272,15 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
         (form,) = fit.forms
         if form.id in rival.fit.ids:
             continue
+        follows = families[form.id][1].follows if form.id in families else None
         both = np.concatenate([own, np.arange(form.span.start, form.span.stop)])
         inner = without_span(gram, both, _use(rival.fit))[0]
         pair = block_diag(drawn[:, np.newaxis], fit.coefficients[:, np.newaxis])
         (one, across), (_, other) = pair.T @ inner @ pair
-        alike.append((float(across / np.sqrt(one * other)) if min(one, other) > 0 else 0.0, form.id))
-    nearest, name = max(alike, default=(0.0, ""))
-    return name if nearest >= _ALIKE else None
+        least = _ALIKE_OVER if follows == rival.free.basis.covariate else _ALIKE
+        alike.append((float(across / np.sqrt(one * other)) - least if min(one, other) > 0 else -1.0, form.id))
+    nearest, name = max(alike, default=(-1.0, ""))
+    return name if nearest >= 0.0 else None
 
 
 def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:

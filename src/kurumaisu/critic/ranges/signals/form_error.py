@@ -63,6 +63,11 @@ class FormFamily:
         """Return the number of coefficients."""
         return sum(len(curve.prior) for curve in self.curves)
 
+    @property
+    def follows(self) -> str | None:
+        """Return what the effect itself is a curve over, if it is one."""
+        return next((curve.covariate for curve in self.curves if curve.signal is None), None)
+
     def columns(self, shots: Shots, seen: BeamHits) -> FloatArray:
         """Return the curves (k, b, n) over the beams."""
         return np.concatenate([curve.columns(shots, seen) for curve in self.curves], axis=2)
