@@ -125,10 +125,10 @@ def sign(p, v, w):
 @_rates("base.cross_v_to_w")
 @_each
 def cross_v_to_w(p, v, w):
-    """A leak [V] beside V_s turns the chair by its slope; with rests, not one that is to go straight."""
+    """A leak [V] beside V_s turns the chair by its slope; with rests, not one that is to go straight, nor back."""
     slope, _ = branch("steering", w)
-    leak = 0.0 if p["rests"] >= 0.5 and w == 0 else p["share"] * volts("translation", v)
-    return v, 0.0, w + leak / slope
+    turned = w + p["share"] * volts("translation", v) / slope
+    return v, 0.0, 0.0 if p["rests"] >= 0.5 and turned * w <= 0 else turned
 
 
 def _swallowed(axis, rate, p):

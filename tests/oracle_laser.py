@@ -37,9 +37,10 @@ def _spread(name, rule):
     READINGS[name] = lambda p, b: b.mean + rule(p, b) * b.noise
 
 
-def _footprint(incidence: float) -> float:
-    """How much longer than wide the spot on the wall is, less 1; as at 80 degrees beyond them."""
-    return 1 / math.sin(math.pi / 2 - min(incidence, math.radians(80))) - 1
+def _footprint(p: dict[str, float], incidence: float) -> float:
+    """How much longer than wide the spot on the wall is, less 1, or its depth; as at 80 degrees beyond them."""
+    across = math.sin(math.pi / 2 - min(incidence, math.radians(80)))
+    return (1 / across - 1) * (1 - p["tangent"]) + math.sqrt(1 - across**2) / across * p["tangent"]
 
 
 _bias("laser.offset", lambda p, b: p["offset"])
@@ -51,8 +52,8 @@ _bias(
     "laser.cyclic",
     lambda p, b: p["amplitude"] * math.cos(math.tau * b.range / p["wavelength"] + p["phase"] - math.pi / 2),
 )
-_bias("laser.incidence_bias", lambda p, b: p["k"] * _footprint(b.incidence))
-_spread("laser.incidence_noise", lambda p, b: b.sd + b.sd * p["gain"] * _footprint(b.incidence))
+_bias("laser.incidence_bias", lambda p, b: p["k"] * _footprint(p, b.incidence))
+_spread("laser.incidence_noise", lambda p, b: b.sd + b.sd * p["gain"] * _footprint(p, b.incidence))
 _spread("laser.range_noise", lambda p, b: max(0.0, b.sd + p["share"] * b.sd + p["slope"] * (b.range - 2)))
 _bias("laser.beam_bias", lambda p, b: p["amplitude"] * math.cos(p["phase"] - b.bearing))  # with sd 0: the mirror alone
 

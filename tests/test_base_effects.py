@@ -76,6 +76,12 @@ def test_formula_at_chosen_values(name, values, v, w):
     assert out.u is None
 
 
+def test_a_leak_that_the_dead_zone_swallows_turns_no_chair_back():
+    """10 % of 0.79 V at 0.5 m/s turn it by 0.158 rad/s to the right, or by 0.168 if it turns right already."""
+    out = apply("base.cross_v_to_w", {"share": 0.1, "rests": 1.0}, [0.5, 0.5, 0.5], [0.3, 0.1, 0.0])
+    np.testing.assert_allclose(out.w, [0.3 - 0.0789916 / 0.499211, 0.0, 0.0], atol=1e-6)
+
+
 def test_lateral_slip_goes_outwards():
     np.testing.assert_allclose(
         apply("base.lateral_slip", {"c": 0.1}).u, [-0.015, 0.02, 0.012, 0.0, 0.0, 0.0], atol=1e-12

@@ -72,6 +72,10 @@ def test_biases_at_chosen_values():
         (bias("laser.cyclic", silent(), amplitude=0.003, wavelength=2.0), 0.003 * np.array([1, 0, -1, 0, 0, 0])),
         (bias("laser.cyclic", silent(), amplitude=0.003, wavelength=2.0, phase=np.pi), [-0.003, 0, 0.003, 0, 0, 0]),
         (bias("laser.incidence_bias", silent(incidence=INCIDENCE), k=0.003), 0.003 * footprint),
+        (
+            bias("laser.incidence_bias", silent(incidence=INCIDENCE), k=0.003, tangent=1.0),
+            0.003 * np.tan(np.minimum(INCIDENCE[HIT], np.deg2rad(80))),
+        ),
         (bias("laser.reflectance", silent(returns=returns), bias=0.02), [0.0, 0.01, 0.02, -0.02, 0.0, 0.0]),
         (bias("laser.beam_bias", silent(), amplitude=0.003, phase=0.5), 0.003 * np.cos(phi - 0.5)),
     ]

@@ -36,8 +36,8 @@ class CrossWToV(Effect):
 class CrossVToW(Effect):
     """The yaw rate that a share of V_f makes on the steering input: crosstalk of the joystick's two lines.
 
-    Other than base.veer it has the jump of V_f where the chair starts to move. rests: 1 where a chair that is to go
-    straight does not turn, its leak being within the dead zone of the steering.
+    Other than base.veer it has the jump of V_f where the chair starts to move. rests: 1 where the dead zone of the
+    steering swallows a leak: a chair that is to go straight does not turn, nor any to the other side than it is to.
     """
 
     id = "base.cross_v_to_w"
@@ -49,7 +49,7 @@ class CrossVToW(Effect):
     )
     forms = ({"rests": 0.0}, {"rests": 1.0})
     sentence = "the translation voltage leaks into the steering"
-    formula = "w + share · V_f(v) · gain of V_s(w); with rests = 1, w where no turn is asked for"
+    formula = "w + share · V_f(v) · gain of V_s(w); with rests = 1, 0 of another sign, w where no turn is asked for"
     source = "paper, section on identification: weak, correlation 0.003"
     shows_in = Rate.W
     follows = Follows.V
@@ -57,6 +57,8 @@ class CrossVToW(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Add what a share of V_f makes to w."""
         leak = self.values["share"] * self.context.translation.volts(motion.v)
+        w = motion.w + leak * self.context.steering.gain(motion.w)
         if self.values["rests"] >= 0.5:
-            leak = np.where(motion.known.get("w_asked", motion.w) == 0, 0.0, leak)
-        return replace(motion, w=motion.w + leak * self.context.steering.gain(motion.w))
+            straight = motion.known.get("w_asked", motion.w) == 0
+            w = np.where(straight, motion.w, np.where(w * motion.w < 0, 0.0, w))
+        return replace(motion, w=w)

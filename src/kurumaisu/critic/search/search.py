@@ -274,6 +274,10 @@ class _Search:
             for guess in others[:_SWAPPED]:
                 if guess.nats > min(best - self.bare(rest), own) - _HOPELESS:
                     self._with(rest, guess)
+            # Lines say little about what has many likely sizes: its other forms are tried at the size that it has.
+            for form in self.problem.candidates if one.rough else ():
+                if form.id == one.id and form not in fit.candidates:
+                    self.fit(rest.candidates | {form}, fit.start)
 
     def _with(self, fit: Fit, guess: Guess) -> None:
         self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})

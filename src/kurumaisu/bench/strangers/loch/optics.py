@@ -69,7 +69,8 @@ def _edges(s: Shot, k: float, h: Hidden) -> Out:
     """At edges something between near and far; other form: nearer to the beam's own side."""
     rng, jump = rng_of(s, h), np.diff(s.mean, axis=1, append=s.mean[:, -1:])
     share = rng.beta(2, 4, jump.shape) if h.form else rng.random(jump.shape)
-    return _event(s, (np.abs(jump) > 0.1) & (rng.random(jump.shape) < k), lambda r: r + share * jump)
+    two = np.diff(s.hit, axis=1, append=s.hit[:, -1:]) != 0  # along one wall there is nothing between
+    return _event(s, two & (np.abs(jump) > 0.1) & (rng.random(jump.shape) < k), lambda r: r + share * jump)
 
 
 def _lost(s: Shot, k: float, h: Hidden) -> Out:

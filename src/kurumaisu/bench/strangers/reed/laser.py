@@ -124,7 +124,7 @@ def view(
     side = np.where(floor < level, 998.0, side)
     shade = np.array([COLOURS[c] for c in s.room.colours])
     bright = shade[np.clip(side // 4, 0, len(shade) - 1).astype(int)]
-    jump = np.abs(np.diff(r, axis=1, prepend=r[:, :1])) > 0.1
+    jump = (np.abs(np.diff(r, axis=1, prepend=r[:, :1])) > 0.1) & (np.diff(side, axis=1, prepend=side[:, :1]) != 0)
     grid = path.t[:-1]
     wide = np.ones_like(r)
     v, w = (np.interp(stamps, grid, rate)[:, None] * wide for rate in rates)
