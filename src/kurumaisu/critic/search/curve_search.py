@@ -27,6 +27,7 @@ _DRAWN = 0.8  # share of a signal's square that a curve can draw, from which it 
 _HINTS = 3  # curves in whose place others are tried: most of a jump shows in a curve that cannot jump
 _BENDING = _JUMPING = 0.2  # share of what is outside the catalogue that bends more often, or jumps
 _ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
+_AS_ALIKE = 0.01  # by which the correlation with another one's may be less, and nobody knows which of both it draws
 _NO_LEVEL = 0.05  # share of a signal's square beyond a level, below which it is one
 _SAME = 0.1  # share of the rates by which they may differ and be nearly the same
 _WORTH = -2.0  # [nat] below which a curve is not kept
@@ -37,7 +38,7 @@ class SetWithCurve:
     """A set of effects with a curve beside it: by how many nats the data and the prior are for the curve.
 
     form_of: the effects that it draws: one of the set, so that both together are another form of it, or some that the
-    set has not.
+    set has not. likewise: other single effects that it draws as well.
     """
 
     fit: Fit
@@ -45,6 +46,7 @@ class SetWithCurve:
     evidence: CurveEvidence
     nats: float
     form_of: frozenset[str] = frozenset()
+    likewise: frozenset[str] = frozenset()
 
 
 class CurveSearch:
@@ -150,10 +152,12 @@ class CurveSearch:
             signal = without(beside.own, self._signals(fit, ids).sum(axis=1))
             size = max(float(np.linalg.norm(drawn) * np.linalg.norm(signal)), 1e-12)
             alike.append((ids, float(drawn @ signal) / size))
-        best = max((each for each in alike if len(each[0]) == 1), key=lambda each: each[1], default=(frozenset(), 0.0))
+        single = [each for each in alike if len(each[0]) == 1]
+        best = max(single, key=lambda each: each[1], default=(frozenset(), 0.0))
         several = [each for each in alike if len(each[0]) > 1]
         found = next((ids for ids, share in (best, *several) if share >= _ALIKE), frozenset())
-        return replace(one, form_of=found)
+        close = (ids for ids, share in single if len(found) == 1 and share >= best[1] - _AS_ALIKE)
+        return replace(one, form_of=found, likewise=frozenset[str]().union(*close) - found)
 
     def _signals(self, fit: Fit, names: frozenset[str]) -> FloatArray:
         """Return what effects of a fit do to the way, and to the turns, whitened, (rows, 2)."""

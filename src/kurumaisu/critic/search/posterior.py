@@ -227,7 +227,9 @@ def posterior(problem: Problem, fitted: Mapping[frozenset[Candidate], Fit], sear
     asked = (others > _SAID) | (curved > bare.max())
     curves = [_told(one, fits, len(names), search) if told else one for one, told in zip(found, asked, strict=True)]
     acting = [(fit.ids, float(weight)) for fit, weight in zip(fits, weights, strict=True)]
-    acting += [(one.fit.ids | one.form_of, float(weight)) for one, weight in zip(curves, others, strict=True)]
+    for one, weight in zip(curves, others, strict=True):
+        drawn = (one.form_of, *(frozenset({name}) for name in sorted(one.likewise)))
+        acting += [(one.fit.ids | ids, float(weight) / len(drawn)) for ids in drawn]
     p = dict.fromkeys(names, 0.0)
     for ids, weight in acting:
         for name in ids:
