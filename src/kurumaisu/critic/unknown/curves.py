@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import Drive, edges_of
+from kurumaisu.critic.base.drive import GRID, Drive, edges_of
 from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset, root_of
@@ -178,7 +178,7 @@ WAVES: Mapping[str, Wave] = {
     "y": (0.3, 3.0, ("v_gain", "curvature")),
 }
 _TURNS = 3.0  # in all of a drive, at least: fewer are a slope or a carpet
-_MOST = 150  # periods
+_MOST = 150  # periods, all over the whole of a part of the way
 _AT_ONCE = 16  # of them: more leave the processor's cache
 _OVERTONES = 4
 _PARTS = (1, 2, 3)  # of a turn, after which it may be as large as after all of it
@@ -210,16 +210,19 @@ def _wave_period(sought: _PeriodSearch, kind: Wave, far: float) -> tuple[float, 
     if far < _TURNS * shortest:
         return None
     low, high = max(1 / longest, _TURNS / far), 1 / shortest
-    waves = np.linspace(low, high, int(np.clip(2 * far * (high - low), 2, _MOST)))
-    gained = np.stack([sought.gained(channel, waves, 1) for channel in channels])
+    # Over more of the way than this, so many periods would be out of step with one between them.
+    part = min(far, 0.5 * _MOST / (high - low))
+    waves = np.linspace(low, high, max(int(2 * part * (high - low)), 2))
+    gained = np.stack([sought.gained(channel, waves, 1, part) for channel in channels])
     channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
     # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
-    apart, closer = waves[1] - waves[0], np.arange(-_CLOSER, _CLOSER + 1) / _CLOSER
+    times = int(np.ceil(_CLOSER * far / part))
+    apart, closer = waves[1] - waves[0], np.arange(-times, times + 1) / times
     near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
     near = [some[(some >= low) & (some <= high)] for some in near]
     found = [(wave, sought.gained(channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
     likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
-    return float(1 / likeliest), gained.size
+    return float(1 / likeliest), round(gained.size * far / part)
 
 
 class _PeriodSearch:
@@ -229,11 +232,17 @@ class _PeriodSearch:
         """Take drives with how they react, the covariate, and what is left."""
         self._problem, self._drives = problem, drives
 
-    def gained(self, channel: str, waves: FloatArray, overtones: int) -> FloatArray:
-        """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,)."""
+    def gained(self, channel: str, waves: FloatArray, overtones: int, part: float = np.inf) -> FloatArray:
+        """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,).
+
+        part: of the covariate, in whose next one a wave may have any other phase.
+        """
         size = 2 * overtones
-        gram, pull = np.zeros((len(waves), size, size)), np.zeros((len(waves), size))
+        grams: dict[int, FloatArray] = {}
+        pulls: dict[int, FloatArray] = {}
         for drive, sensitivity, way, white in self._drives:
+            middles = (0.5 * (drive.times[1:] + drive.times[:-1]) - drive.start) / GRID
+            parts = np.repeat(np.floor(way[np.clip(middles.astype(int), 0, len(way) - 1)] / part), 3).astype(int)
             tones = zip(*(_waves(way, times * waves) for times in range(1, overtones + 1)), strict=True)
             at = 0
             for some in tones:
@@ -245,10 +254,16 @@ class _PeriodSearch:
                     for tone in some
                 ]
                 both = whole[0] if overtones == 1 else np.concatenate(whole, axis=2)
-                gram[here] += np.einsum("nki,nkj->kij", both, both)
-                pull[here] += np.einsum("nki,n->ki", both, white)
-        along = np.linalg.solve(gram + 1e-9 * np.eye(size), pull[..., None])[..., 0]
-        return np.asarray(np.einsum("ki,ki->k", pull, along))
+                for key in np.unique(parts).tolist():
+                    own, left = both[parts == key], white[parts == key]
+                    gram = grams.setdefault(key, np.zeros((len(waves), size, size)))
+                    gram[here] += np.einsum("nki,nkj->kij", own, own)
+                    pulls.setdefault(key, np.zeros((len(waves), size)))[here] += np.einsum("nki,n->ki", own, left)
+        out = np.zeros(len(waves))
+        for key, pull in pulls.items():
+            along = np.linalg.solve(grams[key] + 1e-9 * np.eye(size), pull[..., None])[..., 0]
+            out += np.einsum("ki,ki->k", pull, along)
+        return out
 
 
 def _waves(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:
