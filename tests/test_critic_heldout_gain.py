@@ -284,6 +284,19 @@ def test_a_set_of_the_laser_that_no_experiment_decides_says_what_would(group, wo
     assert told.story.next_drive == f"No scripted experiment can decide whether {' or '.join(group)} acts: {words}."
 
 
+def test_two_of_little_evidence_that_undo_each_other_are_not_told():
+    """A longer scale in a smaller map: each gains beside the other, both gain nothing."""
+    settings = tuple(EffectSetting(name, {}) for name in ("laser.scale", "world.map_error"))
+    causes = tuple(Cause(one.id, 0.97, {}, 6.0) for one in settings)
+
+    def worth(some):
+        seen = -0.1 if len(some) == 1 else 0.0
+        return ChannelGain(LogDensityGain(0.0, seen, seen, seen - 0.01, seen + 0.01))
+
+    left, gained = confirmed_scans(LaserFinding(causes, settings=settings), worth)
+    assert (left.causes, left.settings, gained) == ((), (), None)
+
+
 @pytest.mark.parametrize(("nats", "gain", "told"), [(3.0, 0.0, False), (3.0, 0.02, True), (30.0, 0.0, True)])
 def test_little_evidence_must_hold_on_scans_held_out(nats, gain, told):
     """Beside another cause as alone; what is certain must but not lose."""

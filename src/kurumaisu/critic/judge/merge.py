@@ -132,18 +132,23 @@ def _unresolved(before: LaserFinding, left: LaserFinding) -> LaserFinding:
 def _without_faint(
     finding: LaserFinding, worth: ChannelGain, measure: Callable[[Settings], ChannelGain | None]
 ) -> tuple[LaserFinding, ChannelGain | None]:
-    """Return a finding without causes of little evidence by which scans held out gain nothing, and what it is worth."""
+    """Return a finding without causes of little evidence by which scans held out gain nothing, and what it is worth.
+
+    All together first: of two that undo each other, each gains beside the other.
+    """
     gained: ChannelGain | None = worth
-    for cause in finding.causes:
-        if cause.gain_nats >= CERTAIN or gained is None:
+    faint = {cause.id: cause.gain_nats for cause in finding.causes if cause.gain_nats < CERTAIN}
+    each = [{name: nats} for name, nats in faint.items()]
+    for some in [faint, *each] if len(each) > 1 else each:
+        if gained is None or not some.keys() <= {cause.id for cause in finding.causes}:
             continue
         words = (
-            f"laser: {cause.id} is likely by the scans that it was found in ({cause.gain_nats:.1f} nats), but scans "
-            "held out do not confirm it, so it is not told."
+            f"laser: {', '.join(sorted(some))} may act by the scans that this was found in ({max(some.values()):.1f} "
+            "nats), but scans held out do not confirm it, so it is not told."
         )
-        rest = _without(finding, {cause.id}, words)
+        rest = _without(finding, some.keys(), words)
         left = measure(rest.settings) if rest.settings else None
-        alone = left is None and confirmed(gained, cause.gain_nats)
+        alone = left is None and confirmed(gained, max(some.values()))
         if not alone and (left is None or left.log_density_per_sample.gain >= gained.log_density_per_sample.gain):
             finding, gained = rest, left
     return finding, gained

@@ -34,6 +34,7 @@ _LONGEST = 1.0  # [s]
 _RETURN = 0.4  # share of the way out, of which the way back may differ
 _QUIET = 0.35  # the same, that another row near by may be off
 _NEAR = 2  # rows
+_GAP = 5.0  # usual intervals
 # Of a normal vector's components, by the number of them, over the median of its norm.
 _SD = {1: SIGMA_PER_MAD, 2: 0.8493}
 TOPIC = "collision"  # a quantity that says so itself
@@ -117,6 +118,16 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     """Return first row, end and distance [m] of each stretch that is off, however it jumps about meanwhile."""
     lasting, single = jumps(pose, 1.0, command)
     jumped = sorted({*lasting, *single})
+    # How far it may have gone in a gap hides a row next to it that is off, but for the way back.
+    long = np.diff(pose.t) > _GAP * np.median(np.diff(pose.t))
+    hidden = {int(gap) for gap in np.flatnonzero(long) + 1 if any(0 < abs(gap - i) <= _NEAR for i in jumped)}
+    found = _there_and_back(pose, jumped, single)
+    more = _there_and_back(pose, sorted({*jumped, *hidden}), single) if hidden else []
+    return sorted([*found, *(one for one in more if all(one[1] <= a or b <= one[0] for a, b, _ in found))])
+
+
+def _there_and_back(pose: Series, jumped: Sequence[int], single: Sequence[int]) -> list[tuple[int, int, float]]:
+    """Return the same of the rows after which it jumped, or that alone jumped."""
     step = _beyond_motion(pose, jumped)
     found: list[tuple[int, int, float]] = []
     away, last = 0, 0  # rows at which it left, and jumped last

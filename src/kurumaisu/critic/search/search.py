@@ -30,6 +30,7 @@ EffectSet = frozenset[Candidate]
 _WIDTH = 3  # sets that are gone on from in a round
 _NEAR = 8.0  # [nat] behind the best set within which one is gone on from
 _ADDED = 8  # proposals beside a set, forms of one effect among them
+_FIRST = 20  # the same beside nothing: at a single speed, say, many do what the best one does
 _BESIDE_CURVE = 2  # of these, what is proposed beside the best curve
 _SURELY = 4  # of those, tried however little they promise: what an equation misses is not in the promise
 _SWAPPED = 4  # and in the place of each of its effects
@@ -257,27 +258,36 @@ class _Search:
                     self._expand(fit)
 
     def _expand(self, fit: Fit) -> None:
-        best = max(self.bare(other) for other in self.fits.values())
-        for k, guess in enumerate(self._proposals(fit, steps=True)[:_ADDED]):
+        best = self._most()
+        for k, guess in enumerate(self._proposals(fit, steps=True)[: _ADDED if fit.ids else _FIRST]):
+            best = self._most() if k == _ADDED else best
             if (k < _SURELY and guess.nats > 0) or self.bare(fit) + guess.nats > best - _HOPELESS:
                 self._with(fit, guess)
         for one in sorted(fit.candidates, key=lambda candidate: (candidate.id, len(candidate.terms))):
-            rest = self.fit(fit.candidates - {one}, fit.start)
-            if rest is None:
-                continue
-            if any(one.nats > 0 for one in self.curves.found(fit)[:1]):
-                self.curves.beside(rest)  # beside the curve one of them may be needless
-            proposals = self._proposals(rest, steps=not rest.ids)
-            # Lines promise less than a fit keeps, of this one as of a rival that does the same.
-            own = max((g.nats for g in proposals if g.candidate == one), default=np.inf)
-            others = [g for g in proposals if g.candidate not in fit.candidates]
-            for guess in others[:_SWAPPED]:
-                if guess.nats > min(best - self.bare(rest), own) - _HOPELESS:
-                    self._with(rest, guess)
-            # Lines say little about what has many likely sizes: its other forms are tried at the size that it has.
-            for form in self.problem.candidates if one.rough else ():
-                if form.id == one.id and form not in fit.candidates:
-                    self.fit(rest.candidates | {form}, fit.start)
+            self._exchange(fit, one, best)
+
+    def _exchange(self, fit: Fit, one: Candidate, best: float) -> None:
+        """Fit a set without one of its effects, with others in its place, and with other forms of it."""
+        rest = self.fit(fit.candidates - {one}, fit.start)
+        if rest is None:
+            return
+        if any(curve.nats > 0 for curve in self.curves.found(fit)[:1]):
+            self.curves.beside(rest)  # beside the curve one of them may be needless
+        proposals = self._proposals(rest, steps=not rest.ids)
+        # Lines promise less than a fit keeps, of this one as of a rival that does the same.
+        own = max((g.nats for g in proposals if g.candidate == one), default=np.inf)
+        others = [g for g in proposals if g.candidate not in fit.candidates]
+        for guess in others[:_SWAPPED]:
+            if guess.nats > min(best - self.bare(rest), own) - _HOPELESS:
+                self._with(rest, guess)
+        # Lines say little about what has many likely sizes: its other forms are tried at the size that it has.
+        for form in self.problem.candidates if one.rough else ():
+            if form.id == one.id and form not in fit.candidates:
+                self.fit(rest.candidates | {form}, fit.start)
+
+    def _most(self) -> float:
+        """Return the log posterior of the likeliest set without a curve."""
+        return max(map(self.bare, self.fits.values()))
 
     def _with(self, fit: Fit, guess: Guess) -> None:
         self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
