@@ -32,7 +32,7 @@ GENERATORS = ("loch", "reed", "moor", "motors")  # the first two to report on
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 _Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
 _NAMED = 0.9
-_Q = 0.5  # [nat] by which the answers to all queries must be worse than the model's own to be told so
+_Q = 0.5  # [nat] by which the answers must be worse than the model's own to be told so, for each query
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,8 @@ def _case(job: Job) -> Case | None:
     ours, base, oracle = _densities(where / "answers.csv", found)
     if job.kind == "null":  # by our own predictor: the author's knows the true noise
         bare = pipeline.criticise(recording, model, lambda _: None, ids=frozenset())
-        worse = ours < _densities(where / "answers.csv", bare)[0] - _Q
+        queries = len({(one.run, one.t0, one.t1) for one in found.predictions})
+        worse = ours < _densities(where / "answers.csv", bare)[0] - _Q * queries
     gain = (ours - base) / (oracle - base) if oracle - base > 1.0 else None
     proposed = found.verdict.next_experiment is not None or bool(found.story.next_drive)
     return Case(truth, found.verdict, gain, worse, cpu, proposed)
