@@ -67,6 +67,17 @@ def test_rows_that_repeat_the_one_before_while_the_robot_moves_are_set_aside():
     assert f"repeats itself while the robot moves at t = {run.pose.t[moving + 1]:.2f}" in told
 
 
+def test_rows_that_repeat_while_the_robot_speeds_up_are_told_too():
+    """It moves less meanwhile than behind them, and more than before."""
+    t = np.arange(0.0, 20.0, 0.05)
+    values = np.zeros((len(t), 3))
+    values[:, 0] = 0.05 * np.cumsum(np.clip(0.3 + 2.0 * (t - 10.0), 0.3, 1.2))
+    values[201:204] = values[200]
+    np.testing.assert_array_equal(
+        np.flatnonzero(sanity_rows.stale(Series(t, values, ("x", "y", "theta")))), [201, 202, 203]
+    )
+
+
 def test_a_reference_without_noise_that_stops_and_goes_repeats_nothing():
     t = np.arange(0.0, 40.0, 0.05)
     x = np.cumsum(0.05 * np.where(t % 2 < 1.2, 0.4, 0.0))

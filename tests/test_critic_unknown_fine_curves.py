@@ -35,6 +35,13 @@ def test_the_period_of_a_flat_spot_is_that_of_a_turn(dented):
     assert found == pytest.approx(GIRTH, rel=0.008)
 
 
+def test_a_short_wave_is_found_over_a_long_way():
+    """In 200 s the chair drives so far that periods of the whole way are too many to be tried."""
+    wave = hidden.Kind(0, "distance", lambda s, a, b: 0.04 * math.sin(2 * math.pi * s.gone / 0.47))
+    problem = hidden.problem_of(hidden.make(wave, 30.0, 1020, seconds=200.0).recording)
+    assert wave_periods(problem, ())["distance"][0] == pytest.approx(0.47, rel=0.01)
+
+
 def test_what_a_flat_spot_costs_on_the_mean_is_no_certain_gain_beside_its_waves(dented):
     found = search.search(dented, lambda _: None)
     assert found.curves[0].curve.id == "smooth.v_gain.distance"

@@ -160,8 +160,7 @@ def _case(job: Job) -> Case | None:
     ours, base, oracle = _densities(where / "answers.csv", found)
     if job.kind == "null":  # by our own predictor: the author's knows the true noise
         bare = pipeline.criticise(recording, model, lambda _: None, ids=frozenset())
-        queries = len({(one.run, one.t0, one.t1) for one in found.predictions})
-        worse = ours < _densities(where / "answers.csv", bare)[0] - _Q * queries
+        worse = ours < _densities(where / "answers.csv", bare)[0] - _Q * len(found.predictions)
     gain = (ours - base) / (oracle - base) if oracle - base > 1.0 else None
     proposed = found.verdict.next_experiment is not None or bool(found.story.next_drive)
     return Case(truth, found.verdict, gain, worse, cpu, proposed)

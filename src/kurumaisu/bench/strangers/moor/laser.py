@@ -118,13 +118,12 @@ def look(m: Motion, pose: PoseAt, stamps: Array, fan: Fan, room: Room, o: Optics
     if o.shrink or o.shift or o.turn:
         room = room.moved(np.random.default_rng(seed), o.shrink, o.shift, o.turn)
     ox, oy = x + np.cos(h) * o.x - np.sin(h) * o.y, y + np.sin(h) * o.x + np.cos(h) * o.y
-    seen, below = tilted(bearing, o.pitch, -o.roll)
+    seen, down = tilted(bearing, o.pitch, -o.roll)
     angle = h + o.yaw + seen
     r, incidence, face = room.cast(ox.ravel(), oy.ravel(), angle.ravel())
     r, incidence, face = r.reshape(t.shape), incidence.reshape(t.shape), face.reshape(t.shape)
-    down = np.sin(below)
     with np.errstate(divide="ignore"):
-        r = np.minimum(r / np.sqrt(1 - down**2), np.where(down > 0, HEIGHT / np.maximum(down, 1e-9), np.inf))
+        r = np.minimum(r / np.cos(down), np.where(down > 0, HEIGHT / np.maximum(np.sin(down), 1e-9), np.inf))
     dark = np.array([b.dark for b in room.boxes for _ in range(4)] + [False])[face] * 1.0
     hit_x, hit_y = ox + r * np.cos(angle), oy + r * np.sin(angle)
     return Cast(r, incidence, face, bearing, np.broadcast_to(beam, t.shape) * 1.0, t, hit_x, hit_y, angle, dark, m)

@@ -95,7 +95,7 @@ def look(s: Scans, f: dict[str, float]) -> View:
             rate[c, i] = (np.interp(t[i] + 0.02, s.grid, s.pose[:, c, run]) - pose[c, i]) / 0.02
     c, q = np.cos(pose[2]), np.sin(pose[2])
     mx, my = MOUNT[0] + f.get("x", 0.0), MOUNT[1] + f.get("y", 0.0)
-    seen, down = tilted(bearing + np.zeros_like(t), f.get("pitch", 0.0), f.get("roll", 0.0))
+    seen, down = tilted(bearing, f.get("pitch", 0.0), f.get("roll", 0.0))
     a = pose[2] + seen + f.get("yaw", 0.0)
     r, tan, side = cast(pose[0] + mx * c - my * q, pose[1] + mx * q + my * c, a, s.room.segments(mapped(s.room, s, f)))
     r = np.minimum(r / np.cos(down), np.where(down > 1e-3, HEIGHT / np.sin(np.maximum(down, 1e-3)), 1e3))
