@@ -118,16 +118,6 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     """Return first row, end and distance [m] of each stretch that is off, however it jumps about meanwhile."""
     lasting, single = jumps(pose, 1.0, command)
     jumped = sorted({*lasting, *single})
-    # How far it may have gone in a gap hides a row next to it that is off, but for the way back.
-    long = np.diff(pose.t) > _GAP * np.median(np.diff(pose.t))
-    hidden = {int(gap) for gap in np.flatnonzero(long) + 1 if any(0 < abs(gap - i) <= _NEAR for i in jumped)}
-    found = _there_and_back(pose, jumped, single)
-    more = _there_and_back(pose, sorted({*jumped, *hidden}), single) if hidden else []
-    return sorted([*found, *(one for one in more if all(one[1] <= a or b <= one[0] for a, b, _ in found))])
-
-
-def _there_and_back(pose: Series, jumped: Sequence[int], single: Sequence[int]) -> list[tuple[int, int, float]]:
-    """Return the same of the rows after which it jumped, or that alone jumped."""
     step = _beyond_motion(pose, jumped)
     found: list[tuple[int, int, float]] = []
     away, last = 0, 0  # rows at which it left, and jumped last
@@ -145,7 +135,17 @@ def _there_and_back(pose: Series, jumped: Sequence[int], single: Sequence[int]) 
             away = 0
     if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
         found.append((away, away + 1, far))
-    return found
+    ends = {row for first, end, _ in found for row in (first, end)}
+    return sorted([*found, *_next_to_gaps(pose, [i for i in jumped if i not in ends])])
+
+
+def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, int, float]]:
+    """Yield the same of the few rows between a gap and a jump: how far it may have gone in a gap hides the other."""
+    lasts = np.diff(pose.t)
+    gaps = (np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist()
+    for i in jumped:
+        far = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
+        yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= _NEAR)
 
 
 def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
