@@ -38,9 +38,12 @@ def test_a_body_is_dragged_and_turned(visit, shown):
 
 
 def test_a_place_that_is_refused_is_said_once(visit, shown):
-    drag(visit, BOX, (4.3, 1.0))
+    drag(visit, BOX, (4.3, 1.0), release=False)
     alarm = visit.page.locator("#alarm")
     expect(alarm).to_have_text("set_pose: 2 would stand in a wall")
+    visit.page.mouse.up()
+    visit.page.mouse.move(*visit.spot(0.0, 0.0))
+    visit.page.wait_for_timeout(300)
     assert visit.page.locator("#log li").count() == 1
 
 

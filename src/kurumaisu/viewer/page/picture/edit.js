@@ -14,6 +14,7 @@ export class Edit {
   #arrow = null; // {from, to, kind} of a tool
   #held = false;
   #way = null; // {body, before, after} that is asked for, and whether some of it was done
+  #told = ""; // why some of it was refused, which was said
 
   /**
    * can(name): may this command be given now? ask(name, values): gives it; resolves with its reply; moved(body, before,
@@ -32,7 +33,7 @@ export class Edit {
           this.#ghost = null;
           this.#record();
         }
-        if (!reply.ok) failed(reply.message);
+        if (!reply.ok && reply.message !== this.#told) failed(this.#told = reply.message);
         picture.dirty("front");
       },
     );
@@ -46,6 +47,7 @@ export class Edit {
     const [x, y, yaw] = this.#way?.after ?? before;
     const after = [x, y, Math.atan2(Math.sin(yaw + angle), Math.cos(yaw + angle))];
     this.#way = {...this.#way ?? {body, before}, after};
+    this.#told = "";
     this.place(body.id, after);
   }
 
@@ -128,6 +130,7 @@ export class Edit {
     const before = this.scene.poseOf(body);
     let moved = false;
     this.#record();
+    this.#told = "";
     const put = (target, held) => {
       this.#held = held;
       this.#way = {...this.#way ?? {body, before}, after: target};
