@@ -159,4 +159,5 @@ def test_a_law_that_is_nobody_s_first_is_one_cause_still(rate, law, right):
     rivals = {f"base.{kind}_{rate}" for kind in ("gain", "curvature", "dead_zone")} | {"base.saturation"}
     found = search.search(problem_of([fault], rivals, 2), lambda _: None)
     assert len(found.named) == 1
+    assert found.best.ids <= right
     assert set(found.named) <= right
