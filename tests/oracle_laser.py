@@ -46,7 +46,7 @@ def _footprint(p: dict[str, float], incidence: float) -> float:
 _bias("laser.offset", lambda p, b: p["offset"])
 _bias("laser.scale", lambda p, b: p["scale"] * b.range)
 _bias("laser.quadratic", lambda p, b: p["quadratic"] * b.range * b.range)
-_bias("laser.warmup", lambda p, b: p["amplitude"] * 0.5 ** (b.time / (p["tau"] * math.log(2))))
+_bias("laser.warmup", lambda p, b: p["amplitude"] * (0.5 ** (b.time / (p["tau"] * math.log(2))) - p["cold"]))
 _bias("laser.temperature", lambda p, b: p["coefficient"] * p["swing"] * math.sin(math.tau * b.time / p["period"]))
 _bias(
     "laser.cyclic",

@@ -67,6 +67,7 @@ def test_biases_at_chosen_values():
         (bias("laser.scale", silent(), scale=0.01), 0.01 * r),
         (bias("laser.quadratic", silent(), quadratic=0.002), 0.002 * r**2),
         (bias("laser.warmup", silent(stamp=600.0), amplitude=0.01, tau=600.0), 0.01 / np.e),
+        (bias("laser.warmup", silent(stamp=600.0), amplitude=0.01, tau=600.0, cold=1.0), 0.01 / np.e - 0.01),
         (bias("laser.temperature", silent(stamp=150.0), coefficient=5e-4, swing=8.0, period=600.0), 0.004),
         (bias("laser.temperature", silent(stamp=450.0), coefficient=5e-4, swing=8.0, period=600.0), -0.004),
         (bias("laser.cyclic", silent(), amplitude=0.003, wavelength=2.0), 0.003 * np.array([1, 0, -1, 0, 0, 0])),
