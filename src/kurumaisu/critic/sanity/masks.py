@@ -119,7 +119,9 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
     lasting, single = jumps(pose, 1.0, command)
     jumped = sorted({*lasting, *single})
     step = _beyond_motion(pose, jumped)
-    found: list[tuple[int, int, float]] = []
+    found = [(row, row + 1, float(np.hypot(*step[row - 1]))) for row in _singles(pose, jumped)]
+    alone = {row for first, end, _ in found for row in (first, end)}
+    jumped = [i for i in jumped if i not in alone]  # what one row does is no end of what lasts for longer
     away, last = 0, 0  # rows at which it left, and jumped last
     off, far = np.zeros(2), 0.0  # how far it is off, and was at most
     for i in jumped:
@@ -156,6 +158,15 @@ def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
         return step
     rates = (step / lasts)[quiet - 1]
     return np.asarray(step - lasts * np.column_stack([np.interp(pose.t[1:], pose.t[quiet], one) for one in rates.T]))
+
+
+def _singles(pose: Series, jumped: Sequence[int]) -> list[int]:
+    """Return the rows that jump away alone, and back with the next."""
+    out: list[int] = []
+    for i in jumped:
+        if i + 1 in jumped and i - 1 not in out and _alone(pose, i):
+            out.append(i)
+    return out
 
 
 def _alone(pose: Series, row: int) -> bool:
