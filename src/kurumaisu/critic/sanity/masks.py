@@ -114,14 +114,45 @@ def _fresh(name: str, pose: Series) -> tuple[Series, list[str]]:
     return pose.rows(~old), [f"{name}: the reference repeats itself while the robot moves at t = {begun}: {_rows(old)}"]
 
 
-def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, float]]:
-    """Return first row, end and distance [m] of each stretch that is off, however it jumps about meanwhile."""
+_Spans = list[tuple[int, int, float]]  # first row, end and distance [m] of each stretch that is off
+
+
+def _elsewhere(pose: Series, command: Series | None) -> _Spans:
+    """Return what is off, however it jumps about meanwhile: what leaves fewest jumps, and then most rows.
+
+    A jump may end what lasts for longer, or be what a single row does.
+    """
     lasting, single = jumps(pose, 1.0, command)
     jumped = sorted({*lasting, *single})
     step = _beyond_motion(pose, jumped)
-    found = [(row, row + 1, float(np.hypot(*step[row - 1]))) for row in _singles(pose, jumped)]
-    alone = {row for first, end, _ in found for row in (first, end)}
-    jumped = [i for i in jumped if i not in alone]  # what one row does is no end of what lasts for longer
+    alone = [(row, row + 1, float(np.hypot(*step[row - 1]))) for row in _singles(pose, jumped)]
+    ways = []
+    known: _Spans
+    for known in ([], alone) if alone else ([],):
+        rest = [i for i in jumped if i not in _ends(known)]
+        found = [*known, *_returns(pose, rest, set(single), step)]
+        found += _next_to_gaps(pose, [i for i in jumped if i not in _ends(found)])
+        left = len(set(jumped) - _ends(found))
+        ways.append((left, sum(end - first for first, end, _ in found), sorted(found)))
+    return min(ways)[2]
+
+
+def _ends(spans: _Spans) -> set[int]:
+    return {row for first, end, _ in spans for row in (first, end)}
+
+
+def _singles(pose: Series, jumped: Sequence[int]) -> list[int]:
+    """Return the rows that jump away alone, and back with the next."""
+    out: list[int] = []
+    for i in jumped:
+        if i + 1 in jumped and i - 1 not in out and _alone(pose, i):
+            out.append(i)
+    return out
+
+
+def _returns(pose: Series, jumped: Sequence[int], single: set[int], step: FloatArray) -> _Spans:
+    """Return the stretches from a jump to the one that brings it back; step (n - 1, 2) [m]: beyond the motion."""
+    found: _Spans = []
     away, last = 0, 0  # rows at which it left, and jumped last
     off, far = np.zeros(2), 0.0  # how far it is off, and was at most
     for i in jumped:
@@ -137,8 +168,7 @@ def _elsewhere(pose: Series, command: Series | None) -> list[tuple[int, int, flo
             away = 0
     if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
         found.append((away, away + 1, far))
-    ends = {row for first, end, _ in found for row in (first, end)}
-    return sorted([*found, *_next_to_gaps(pose, [i for i in jumped if i not in ends])])
+    return found
 
 
 def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, int, float]]:
@@ -160,22 +190,13 @@ def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
     return np.asarray(step - lasts * np.column_stack([np.interp(pose.t[1:], pose.t[quiet], one) for one in rates.T]))
 
 
-def _singles(pose: Series, jumped: Sequence[int]) -> list[int]:
-    """Return the rows that jump away alone, and back with the next."""
-    out: list[int] = []
-    for i in jumped:
-        if i + 1 in jumped and i - 1 not in out and _alone(pose, i):
-            out.append(i)
-    return out
-
-
 def _alone(pose: Series, row: int) -> bool:
     """Tell whether the row after one that jumped is back where it jumped from."""
     jump, left = pose.values[row : row + 2, :2] - pose.values[row - 1, :2]
     return bool(np.hypot(*left) < _SAME * np.hypot(*jump))
 
 
-def _told(name: str, pose: Series, spans: list[tuple[int, int, float]], off: BoolArray) -> str:
+def _told(name: str, pose: Series, spans: _Spans, off: BoolArray) -> str:
     first, end, far = spans[0]
     where = (
         f"t = {moment(float(pose.t[first]))} to {moment(float(pose.t[end - 1]))}"
