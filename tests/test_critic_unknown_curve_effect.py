@@ -109,6 +109,9 @@ def test_covariates_are_what_they_are_called():
     np.testing.assert_allclose(values("since_command"), DT * np.array([0.5, 1.5, 0.5, 0.5, 0.5, 0.5]))
     np.testing.assert_allclose(values("since_rest"), [np.inf] * 5 + [0.0])
     np.testing.assert_allclose(values("since_reversal"), [np.inf, np.inf, 0.004, 0.012, 0.016, 0.016])
+    lag = 0.2 * np.exp(-DT / 0.2 * np.arange(3))  # what v, held at 0.2 from rest on, is ahead of a lag
+    np.testing.assert_allclose(values("acceleration")[:2], -np.diff(lag) / DT)
+    np.testing.assert_allclose(values("yaw_acceleration")[:3], 0.0)
     np.testing.assert_allclose(values("heading"), 1 + DT * np.array([0, 0, 0, 0.25, 0.75, 1.0]))
     np.testing.assert_allclose(values("distance"), DT * np.array([0.1, 0.3, 0.6, 1.0, 1.2, 1.2]))
     np.testing.assert_allclose(values("wheel_left", 0.6), v - 0.3 * w)

@@ -48,6 +48,7 @@ def watched(v, w, u, heading):
     rows, x, y, t = [], 0.0, 0.0, 0.0
     since_command, since_reversal, way, asked, distance = math.inf, math.inf, 0, (0.0, 0.0), 0.0
     since_rest = math.inf
+    behind = [0.0, 0.0]  # the rates of a chair with a lag of 0.2 s
     for speed, turn, aside in zip(v, w, u, strict=True):
         if (speed, turn) != asked:
             asked, since_command = (speed, turn), 0.0
@@ -56,6 +57,8 @@ def watched(v, w, u, heading):
         direction = (speed > 0) - (speed < 0)
         if direction and direction != way:
             since_reversal, way = (0.0 if way else since_reversal), direction
+        late = [rate + (old - rate) * math.exp(-DT / 0.2) for rate, old in zip((speed, turn), behind, strict=True)]
+        changes, behind = [(new - old) / DT for new, old in zip(late, behind, strict=True)], late
         middle = heading + turn * DT / 2
         east = speed * math.cos(middle) - aside * math.sin(middle)
         north = speed * math.sin(middle) + aside * math.cos(middle)
@@ -66,6 +69,8 @@ def watched(v, w, u, heading):
                 "w": turn,
                 "abs_w": abs(turn),
                 "v_times_w": speed * turn,
+                "acceleration": changes[0],
+                "yaw_acceleration": changes[1],
                 "wheel_left": speed - turn * TRACK / 2,
                 "wheel_right": speed + turn * TRACK / 2,
                 "time": t + DT / 2,

@@ -29,7 +29,7 @@ TRACK = MODEL.chassis.track
 class State:
     """Of the robot now: rates asked for, pose, time, age of the command, way since reversing, in all, a temperature.
 
-    moved: time since it last rested.
+    moved: time since it last rested; gains, veers: what the rates are ahead of where 0.3 s of lag would have them.
     """
 
     v: float = 0.0
@@ -43,6 +43,8 @@ class State:
     way: float = 1e9
     gone: float = 0.0
     warmth: float = 20.0
+    gains: float = 0.0
+    veers: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,8 @@ KINDS = {
     "warm grease": Kind(0, "temperature", lambda s, a, b: math.tanh((s.warmth - 24 - 4 * a) / 2)),
     "tyre lets go": Kind(2, "time", lambda s, a, b: float(s.time > 20 + 20 * a)),
     "turning costs speed": Kind(0, "abs_w", lambda s, a, b: -max(abs(s.w) - 0.2 - 0.2 * a, 0.0)),
+    "pulls aside when it speeds up": Kind(2, "acceleration", lambda s, a, b: math.tanh(s.gains / (0.2 + 0.2 * a))),
+    "slow into a turn": Kind(0, "yaw_acceleration", lambda s, a, b: -abs(s.veers)),
     "flutter at one speed": Kind(2, "abs_v", lambda s, a, b: bump((abs(s.v) - 0.3 - 0.2 * a) / 0.08)),
 }
 
@@ -157,6 +161,9 @@ def drive(commands, extra, channel, gain_w, noise, rng) -> Run:
     for k in range(steps):
         s.v, s.w, s.time = asked[k][0], asked[k][1] * (1 + gain_w), k * STEP
         s.age = 0.0 if changed[k] else s.age + STEP
+        before = asked[max(k - 1, 0)]
+        s.gains = (s.gains + s.v - before[0]) * math.exp(-STEP / 0.3)
+        s.veers = (s.veers + s.w - before[1] * (1 + gain_w)) * math.exp(-STEP / 0.3)
         s.moved = s.moved + STEP if s.v or s.w else 0.0
         if s.v * last < 0:
             s.way = 0.0

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from kurumaisu.effects.base import Motion
+from kurumaisu.effects.first_order import FirstOrder
 from kurumaisu.types import BoolArray, FloatArray
 
 # Followed by sines and cosines, with a period that the model file states: a turn, the girth of a wheel, or a step of
@@ -28,6 +29,8 @@ MEANINGS: Mapping[str, str] = {
     "w": "yaw rate likewise [rad/s]",
     "abs_w": "its size [rad/s]",
     "v_times_w": "their product [m/s²]",
+    "acceleration": "change of v, as of a chair that follows 0.2 s late [m/s²]",
+    "yaw_acceleration": "change of w likewise [rad/s²]",
     "wheel_left": "speed of the left wheel, v − w · track / 2 [m/s]",
     "wheel_right": "speed of the right wheel, v + w · track / 2 [m/s]",
     "time": "time since the start [s]",
@@ -42,6 +45,7 @@ MEANINGS: Mapping[str, str] = {
     "v_f": "translation voltage [V]; periodic, for steps of the D/A converter",
     "v_s": "steering voltage [V]; periodic likewise",
 }
+_FOLLOWS = 0.2  # [s] time constant with which a chair follows at the soonest: rates that jump have no change else
 _CHANGED = 1e-6  # [m/s, rad/s] more than rounding: the command is another one
 
 
@@ -63,6 +67,7 @@ class Follower:
         self._direction = 0.0  # last direction driven, 0: none yet
         self._travel = np.inf  # [m] since the last reversal
         self._way = 0.0  # [m] since the start
+        self._followed = FirstOrder()  # the rate whose change is asked for
 
     def values(self, motion: Motion) -> FloatArray:
         """Return the covariate in each step, (n,); inf where there was no command, rest or reversal yet."""
@@ -76,6 +81,7 @@ class Follower:
         asked = asked_for(motion)
         self._asked = float(asked[0][-1]), float(asked[1][-1])
         self._direction = float(np.sign(motion.v[-1]))
+        self._followed.level = float((motion.w if self._name == "yaw_acceleration" else motion.v)[-1])
 
     def time(self, motion: Motion) -> FloatArray:
         """Return the time since the start, in the middle of each step [s]."""
@@ -133,6 +139,10 @@ class Follower:
         self._direction, self._travel = float(direction[-1]), float(gone[-1] + way[-1])
         return np.asarray(gone + way / 2)
 
+    def change(self, rate: FloatArray, dt: float) -> FloatArray:
+        """Return the mean change of a rate in each step [1/s of its unit]."""
+        return np.asarray((rate - self._followed.follow(rate, dt, _FOLLOWS)) / _FOLLOWS)
+
     def wheel(self, motion: Motion, side: int) -> FloatArray:
         """Return the speed of the left (side -1) or right (side 1) wheel [m/s]; the constant is the track."""
         return np.asarray(motion.v + side * motion.w * self.constant / 2)
@@ -149,6 +159,8 @@ COVARIATES: Mapping[str, Callable[[Follower, Motion], FloatArray]] = {
     "w": lambda _, motion: motion.w,
     "abs_w": lambda _, motion: np.abs(motion.w),
     "v_times_w": lambda _, motion: motion.v * motion.w,
+    "acceleration": lambda self, motion: self.change(motion.v, motion.dt),
+    "yaw_acceleration": lambda self, motion: self.change(motion.w, motion.dt),
     "wheel_left": lambda self, motion: self.wheel(motion, -1),
     "wheel_right": lambda self, motion: self.wheel(motion, 1),
     "time": Follower.time,

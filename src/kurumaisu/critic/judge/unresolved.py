@@ -32,7 +32,6 @@ from kurumaisu.critic.values.verdict import Gain, Unknown
 from kurumaisu.types import FloatArray
 
 _LEAST = 5.0  # [nat] of evidence for what cannot be named
-_FAR = 0.02  # share of the way or turn that it moves the chair
 _LOUDER = 1.5  # times the variance that the noise has, beyond which drives held out are not understood
 _MISSED = 1.5  # times as far from where it came as noise alone would leave it, beyond which more must act
 _SURE = 0.99  # of the blocks drawn again
@@ -49,16 +48,16 @@ def with_unresolved(
     found = made.found
     nats = found.best.score - found.empty.score
     share = max(shares.values(), default=0.0)
-    off = f"off by {100 * share:.0f} % of the way or turn"
+    off = f"off by {100 * share:.2g} % of the way or turn"
     nearest = " with ".join(sorted(found.best.ids))
     shape, begun = f"{off} after 2 s; nearest {nearest}", f"Something is wrong: after 2 s the chair is {off}"
-    if gain is not None and gain.log_density_per_sample.lo90 > 0 and nats >= _LEAST and share >= _FAR:
+    if gain is not None and gain.log_density_per_sample.lo90 > 0 and nats >= _LEAST and share >= MATERIAL:
         words = (
             f"{begun}, and held-out data confirm it; but these data do not say what it is. Nearest is {nearest} "
             f"(--only {','.join(sorted(found.best.ids))})."
         )
         return _amber(criticism, shape, words)
-    if not found.enough and _whatever_noise(found) >= _LEAST and share >= _FAR:
+    if not found.enough and _whatever_noise(found) >= _LEAST and share >= MATERIAL:
         few = f"{len(found.empty.beside.residual) // 3} intervals between poses are too few to say what it is"
         return _amber(criticism, shape, f"{begun}, however loud the noise; {few}. Nearest is {nearest}.")
     if gain is not None and found.nats(found.best) >= NO_NOISE and share >= MATERIAL:

@@ -30,6 +30,8 @@ COVARIATES = {
     "w": ("w", "yaw rate", "rad/s"),
     "abs_w": ("|w|", "absolute yaw rate", "rad/s"),
     "v_times_w": ("vw", "product of speed and yaw rate", "m/s^2"),
+    "acceleration": ("acceleration", "acceleration", "m/s^2"),
+    "yaw_acceleration": ("yaw_acceleration", "yaw acceleration", "rad/s^2"),
     "wheel_left": ("wheel_left", "speed of the left wheel", "m/s"),
     "wheel_right": ("wheel_right", "speed of the right wheel", "m/s"),
     "time": ("time", "time since the start", "s"),
