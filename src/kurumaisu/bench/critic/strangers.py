@@ -197,7 +197,8 @@ def _density(value: float, mean: float, sd: float) -> float:
 
 def _as_strangers_say(covariate: str) -> str:
     """Return what the generators call what the critic calls so."""
-    return covariate.replace("|", "abs_", 1).replace("|", "").replace("world bearing", "direction")
+    plain = covariate.replace("|", "abs_", 1).replace("|", "").replace("world bearing", "direction")
+    return plain.replace("hit ", "hit_")
 
 
 def _share(hit: Callable[[Case], bool], cases: Sequence[Case]) -> str:
