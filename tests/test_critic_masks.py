@@ -87,6 +87,14 @@ def test_a_row_that_is_off_behind_a_gap_is_set_aside(later):
     assert_without(pose, run, [470, *(row - 30 for row in later)])
 
 
+@pytest.mark.parametrize("row", [0, 1199])
+def test_a_row_that_is_off_at_an_end_is_set_aside(row):
+    run = moved(phased(np.random.default_rng(1)), [row], 4 * OFF)
+    pose, (told,) = judged(run)
+    assert_without(pose, run, [row])
+    assert f"off at t = {run.pose.t[row]:.2f} s: 1 of its 1200 rows set aside" in told
+
+
 def test_a_reference_without_noise_that_stops_and_goes_repeats_nothing():
     t = np.arange(0.0, 40.0, 0.05)
     x = np.cumsum(0.05 * np.where(t % 2 < 1.2, 0.4, 0.0))

@@ -172,9 +172,9 @@ def _returns(pose: Series, jumped: Sequence[int], single: set[int], step: FloatA
 
 
 def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, int, float]]:
-    """Yield the same of the few rows between a gap and a jump: how far it may have gone in a gap hides the other."""
+    """Yield the same of the few rows between a jump and a gap, or an end: where it came from, or went to, is hidden."""
     lasts = np.diff(pose.t)
-    gaps = (np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist()
+    gaps = [0, *(np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist(), len(pose.t)]
     for i in jumped:
         far = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
         yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= _NEAR)

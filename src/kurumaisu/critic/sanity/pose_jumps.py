@@ -89,7 +89,7 @@ def jumps(pose: Series, slack: float = 1.0, command: Series | None = None) -> tu
     if len(xy) < 20:
         return [], []
     step = np.diff(xy, axis=0)
-    padded = np.pad(step / dt[:, None], ((4, 4), (0, 0)), mode="edge")
+    padded = np.pad(step / dt[:, None], ((4, 4), (0, 0)), mode="reflect")  # no end counts more than once
     usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 9, axis=0), axis=-1) * dt[:, None]
     strays = step - usual
     odd = np.hypot(*strays.T)
