@@ -50,6 +50,25 @@ def test_a_quarter_too_much_is_said_of_a_dozen_poses(monkeypatch, effect, size, 
     assert [one.covariate for one in verdict.unknown] == ([] if effect is None else [UNRESOLVED])
 
 
+@pytest.mark.parametrize(
+    ("share", "kind", "words"),
+    [(0.007, "unknown", "off by 0.7 % of the way or turn, and held-out data confirm it"), (0.004, "none", "")],
+)
+def test_what_held_out_data_confirm_is_not_green_from_half_a_percent_on(monkeypatch, share, kind, words):
+    """As little as an effect must do that can be named."""
+    monkeypatch.setattr(
+        unresolved,
+        "with_unresolved",
+        lambda criticism, made, gain, shares, drives: judged(
+            criticism, made, gain, dict.fromkeys(shares, share), drives
+        ),
+    )
+    data = sparse(recording("base.gain_v", 0.25, 70, 40.0))
+    criticism = pipeline.criticise(data, shipped("launch/md100.yaml"), lambda _: None)
+    assert criticism.verdict.verdict == kind
+    assert words in criticism.story.headline
+
+
 def test_what_acts_in_the_drives_to_fit_alone_is_not_green():
     """Somebody mended the chair before the last drive: what the others show predicts that one worse."""
     drives = [make_run("base.lag_v", size, seed, 60.0, USUAL) for seed, size in enumerate([0.5, 0.5, 0.001])]

@@ -21,7 +21,7 @@ def test_each_target_survives_and_goes_beyond_its_seeds(capsys):
     assert rows.keys() >= fuzz.TARGETS.keys()
     for target in fuzz.TARGETS:
         inputs, _, reached, edges, corpus = map(float, rows[target])
-        assert RUNS <= inputs < 1.1 * RUNS  # a few more, where it reads its corpus anew
+        assert RUNS <= inputs < 1.1 * RUNS  # libFuzzer may run a few more: 8 were seen
         assert 0.25 * edges < reached <= edges
         assert corpus > len(list(seeds(target, None))) / 2
 
