@@ -46,6 +46,12 @@ def test_one_for_one_stand_ins_make_a_set():
     assert confounded(posterior((0.5, "a b"), (0.3, "a c"), (0.2, "a d"))) == (("b", "c", "d"),)
 
 
+def test_an_effect_that_may_do_what_two_do_is_in_a_set_with_either():
+    """Of a load a slower chair is one part and a later one the other: a delay and a gain do both, too."""
+    sets = (0.5, "delay load"), (0.1, "delay gain"), (0.2, "delay sag"), (0.2, "load")
+    assert confounded(posterior(*sets)) == (("gain", "load", "sag"), ("delay", "load"))
+
+
 def test_what_needs_others_beside_it_is_in_no_set_where_others_do():
     assert confounded(posterior((0.55, "b"), (0.4, "c"), (0.05, "d e"))) == (("b", "c"),)
 

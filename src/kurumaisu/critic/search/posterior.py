@@ -60,6 +60,7 @@ def confounded(posterior: SetPosterior, p: Mapping[str, float] | None = None) ->
     best = posterior.ranked[0]
     p = posterior.p if p is None else p
     merged: list[set[str]] = []
+    apart: list[set[str]] = []
     for name in sorted(best.ids):
         if p[name] >= NAMED:
             continue
@@ -68,11 +69,18 @@ def confounded(posterior: SetPosterior, p: Mapping[str, float] | None = None) ->
             group = _with_others(posterior, name, group)
         if posterior.any_of(group) < NAMED:
             group = group | _exchanged(posterior, name)
+        pair = {name} | {other for other in best.ids if p[other] < NAMED and posterior.instead(name, other)}
+        if posterior.any_of(group) < NAMED <= posterior.any_of(pair):
+            apart.append(pair | _as_good(posterior, {name}))
+            continue
         meeting = [other for other in merged if other & group]
         merged = [other for other in merged if not other & group] + [group.union(*meeting)]
     told = (group for group in merged if len(group) > 1 and posterior.any_of(group) >= NAMED)
     kept = [group for group in told if len(group) <= _MOST or _needed(posterior, group)]
-    return tuple(tuple(sorted(_likeliest(posterior, group) | _as_good(posterior, group))) for group in kept)
+    sets = [_likeliest(posterior, group) | _as_good(posterior, group) for group in kept]
+    # An effect that does two things may do the one in the place of one effect, and the other in that of another.
+    sets += [pair for i, pair in enumerate(apart) if not any(pair <= other for other in [*sets, *apart[:i]])]
+    return tuple(tuple(sorted(group)) for group in sets)
 
 
 def _likeliest(posterior: SetPosterior, group: set[str]) -> set[str]:
