@@ -63,21 +63,26 @@ def test_a_step_of_the_range_is_outside_the_catalogue(tmp_path, size):
     assert beyond - near == pytest.approx(size, rel=0.4)
 
 
-@pytest.mark.parametrize("size", [0.0, 0.01])
-def test_readings_may_follow_what_went_before(tmp_path, size):
-    """A chair that is asked for something else nods, and its laser is off for a second."""
+@pytest.mark.parametrize(
+    ("size", "lasts", "leans", "told"),
+    [(0.0, 1.0, False, []), (0.01, 0.8, False, ["time_since_command"]), (0.015, 0.2, True, ["acceleration"])],
+)
+def test_readings_may_follow_what_went_before(tmp_path, size, lasts, leans, told):
+    """A chair that is asked for something else nods, or leans back to speed up and forward to slow down."""
     data = recording(tmp_path, None, 0.0, 11, scans=60)
     run, changes = data.runs[0], np.arange(-1.0, 25.0, 2.3)
     asked = np.stack([0.1 + 0.1 * (np.arange(len(changes)) % 2), np.zeros(len(changes))], axis=1)
-    since = run.scan.t - changes[np.searchsorted(changes, run.scan.t, side="right") - 1]
-    nods = np.round(run.scan.values + size * np.exp(-since / 0.8)[:, np.newaxis], 3)
+    last = np.searchsorted(changes, run.scan.t, side="right") - 1
+    since = run.scan.t - changes[last]
+    by = size * np.exp(-since / lasts) * (2.0 * (last % 2) - 1 if leans else 1.0)
+    nods = np.round(run.scan.values + by[:, np.newaxis], 3)
     run = replace(run, command=Series(changes, asked, ("v", "w")), scan=replace(run.scan, values=nods))
     data = with_past(replace(data, runs=(run,)), MODEL)
     known = data.runs[0].covariates["since_command"]
     assert np.interp(run.scan.t, known.t, known.values[:, 0]) == pytest.approx(since, abs=0.03)
     found = criticise_scans(data, MODEL, say)
     assert not found.causes
-    assert [each.covariate for each in found.unknown[:1]] == (["time_since_command"] if size else [])
+    assert [each.covariate for each in found.unknown[:1]] == told
 
 
 def test_beside_what_is_in_no_catalogue_nothing_is_told_of_scatter_but_what_is_lost(tmp_path):

@@ -15,7 +15,8 @@ from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
 
 _SMOOTH = 1.0  # [s] before and after a row
-_PAST = ("since_command", "since_rest", "since_reversal")  # a chair that has just stopped nods, and its laser with it
+# A chair that has just stopped nods, and its laser with it; what is tied to it loosely lags behind when it speeds up.
+_PAST = ("since_command", "since_rest", "since_reversal", "acceleration", "yaw_acceleration")
 
 
 def with_covariates(drive: Drive, run: Run) -> Drive:
