@@ -9,7 +9,7 @@ from phased_drive import PHASE, PHASES, RATES, phased, recorded
 
 from kurumaisu.critic import criticise
 from kurumaisu.critic.base.drive import prepare, without_spans
-from kurumaisu.critic.sanity import masks
+from kurumaisu.critic.sanity import contacts, masks
 from kurumaisu.critic.values.recording import Recording, Series
 from kurumaisu.params import load_model, shipped
 
@@ -38,7 +38,7 @@ def test_a_chair_that_is_held_is_seen_by_a_reference_of_uncertain_headings():
     run = phased(np.random.default_rng(3), held=HELD)
     noise = np.random.default_rng(4).normal(0.0, [0.003, 0.003, 0.009], run.pose.values.shape)
     run = replace(run, pose=replace(run.pose, values=run.pose.values + noise))
-    ((first, end),) = masks.contacts(run, MODEL)
+    ((first, end),) = contacts.contacts(run, MODEL)
     assert first == pytest.approx(HELD[0], abs=0.6)
     assert HELD[1] - 0.2 < end < HELD[1] + 1.5
 
@@ -46,7 +46,7 @@ def test_a_chair_that_is_held_is_seen_by_a_reference_of_uncertain_headings():
 def test_a_chair_that_is_held_while_other_rates_are_asked_for_is_seen():
     """Of each alone it is asked for too short a time to tell."""
     held = 7 * PHASE - 0.6, 7 * PHASE + 0.9
-    ((first, end),) = masks.contacts(phased(np.random.default_rng(7), held=held), MODEL)
+    ((first, end),) = contacts.contacts(phased(np.random.default_rng(7), held=held), MODEL)
     assert first == pytest.approx(held[0], abs=0.5)
     assert held[1] - 0.2 < end < held[1] + 1.5
 
@@ -55,12 +55,12 @@ def test_a_chair_that_is_held_while_other_rates_are_asked_for_is_seen():
 def test_a_chair_that_answers_late_is_not_held_each_time_it_starts(late):
     for seed in range(5):
         run = phased(np.random.default_rng(seed), noise=0.002)
-        assert masks.contacts(replace(run, pose=replace(run.pose, t=run.pose.t + late)), MODEL) == ()
+        assert contacts.contacts(replace(run, pose=replace(run.pose, t=run.pose.t + late)), MODEL) == ()
 
 
 def test_what_it_did_while_it_was_held_is_not_judged():
     run = phased(np.random.default_rng(3), held=HELD)
-    spans = masks.contacts(run, MODEL)
+    spans = contacts.contacts(run, MODEL)
     drive = prepare(run, MODEL)
     pieces = without_spans(drive, spans)
     assert [piece.times[0] > HELD[1] for piece in pieces] == [False, True]
@@ -85,7 +85,7 @@ def test_a_quantity_that_says_so_is_believed_whatever_the_chair_does():
 @pytest.mark.parametrize("rate", [10.0, 20.0])
 def test_nothing_holds_a_chair_that_rests_when_it_is_asked_to(noise, rate):
     for seed in range(5):
-        assert masks.contacts(phased(np.random.default_rng(seed), noise=noise, rate=rate), MODEL) == ()
+        assert contacts.contacts(phased(np.random.default_rng(seed), noise=noise, rate=rate), MODEL) == ()
 
 
 @pytest.mark.parametrize("zone", [0.05, 0.12])
@@ -93,29 +93,29 @@ def test_what_a_dead_zone_swallows_is_no_contact(zone):
     """It does so wherever as little is asked for."""
     for seed in range(5):
         run = phased(np.random.default_rng(seed), [*RATES, (0.11, 0.0), (0.0, 0.11)], zone=zone)
-        assert masks.contacts(run, MODEL) == ()
+        assert contacts.contacts(run, MODEL) == ()
 
 
 def test_a_dead_zone_of_both_rates_is_no_contact_where_the_chair_turns_at_the_same_speed_elsewhere():
     turning = [(0.15, 0.6), (0.15, -0.6), (-0.15, 0.5), (0.15, 0.4)]
     for seed in range(5):
         run = phased(np.random.default_rng(seed), [(0.15, 0.15), *turning], zone=0.2)
-        assert masks.contacts(run, MODEL) == ()
+        assert contacts.contacts(run, MODEL) == ()
 
 
 def test_a_chair_that_hardly_ever_moves_is_not_held_every_time():
     """Then it may be dead, or have another law: that is for the critic to say."""
     run = phased(np.random.default_rng(5), [(0.3, 0.0), (0.0, 0.0)], held=(6.0, PHASE * PHASES))
-    assert masks.contacts(run, MODEL) == ()
+    assert contacts.contacts(run, MODEL) == ()
 
 
 def test_nobody_knows_what_a_chair_did_where_it_was_not_seen():
     run = phased(np.random.default_rng(6), held=HELD)
     seen = (run.pose.t < HELD[0]) | (run.pose.t > HELD[1])
     pose = Series(run.pose.t[seen], run.pose.values[seen], run.pose.columns)
-    assert masks.contacts(replace(run, pose=pose), MODEL) == ()
-    assert masks.contacts(replace(run, pose_source="the odometry"), MODEL) == ()
-    assert masks.contacts(replace(run, command=None), MODEL) == ()
+    assert contacts.contacts(replace(run, pose=pose), MODEL) == ()
+    assert contacts.contacts(replace(run, pose_source="the odometry"), MODEL) == ()
+    assert contacts.contacts(replace(run, command=None), MODEL) == ()
 
 
 def test_a_chair_that_was_held_once_is_told_of_what_it_does_elsewhere():

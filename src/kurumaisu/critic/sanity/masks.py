@@ -6,49 +6,33 @@ Even a poor model says of the next moment how far the chair goes: what it gets w
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from kurumaisu import geometry
 from kurumaisu.critic.base import replay
-from kurumaisu.critic.base.drive import GRID, prepare
+from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.sanity import imu_match
-from kurumaisu.critic.sanity.pose_jumps import jumps
-from kurumaisu.critic.sanity.rows import stale, stretches
+from kurumaisu.critic.sanity.contacts import TOPIC, contacts
+from kurumaisu.critic.sanity.displaced_rows import Spans, displaced_rows
+from kurumaisu.critic.sanity.rows import stale
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
-from kurumaisu.critic.values.robust import third_difference_sd
 from kurumaisu.errors import Error
 from kurumaisu.params import Model
 from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray
 
-_BACK = 5.0  # [s] within which a reference that was elsewhere is back
-_SAME = 0.5  # share of its first jump that is left when it is back
 _MOST = 0.05  # share of a run's rows that may be set aside
 _FAR = 8.0  # sds of what a model leaves between two rows
 _LONGEST = 1.0  # [s]
 _RETURN = 0.4  # share of the way out, of which the way back may differ
 _QUIET = 0.35  # the same, that another row near by may be off
 _NEAR = 2  # rows
-_GAP = 5.0  # usual intervals
 # Of a normal vector's components, by the number of them, over the median of its norm.
 _SD = {1: SIGMA_PER_MAD, 2: 0.8493}
-TOPIC = "collision"  # a quantity that says so itself
-_ASKED = np.array([0.1, 0.2])  # [m/s], [rad/s] from which a chair is asked to move
-_STANDS = 0.15  # share of that below which it stands
-_LATEST = 0.6  # [s] by which a chair may answer late
-_BEFORE = 0.2  # [s] beyond that for which it must have been asked, in whichever axis
-_NOISE = 3.0  # sds of such a rate by errors of the reference, that one which stands may seem to have
-_MOST_SEEN = 0.5  # share of what it is asked for that it may seem to have by them
-_WINDOW = 0.4  # [s] over which its rates are taken
-_LEAST = 0.4  # [s] of standing, beyond the window
-_LIKE = (0.7, 1.4)  # times what is asked for, of which it is known what the chair does elsewhere
-_MOVES = 0.7  # share of that time in which it moves, at least
-_MARGINS = (0.4, 1.0)  # [s] before and after, in which it is stopped, and gets going again
 
 
 def set_aside(recording: Recording, model: Model) -> Recording:
@@ -87,7 +71,7 @@ def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
         return run, []
     pose, words = _fresh(run.name, run.pose)
     run = replace(run, pose=pose)
-    spans = _elsewhere(pose, run.command)
+    spans = displaced_rows(pose, run.command)
     off = np.zeros(len(pose.t), dtype=np.bool_)
     for first, end, _ in spans:
         off[first:end] = True
@@ -114,89 +98,7 @@ def _fresh(name: str, pose: Series) -> tuple[Series, list[str]]:
     return pose.rows(~old), [f"{name}: the reference repeats itself while the robot moves at t = {begun}: {_rows(old)}"]
 
 
-_Spans = list[tuple[int, int, float]]  # first row, end and distance [m] of each stretch that is off
-
-
-def _elsewhere(pose: Series, command: Series | None) -> _Spans:
-    """Return what is off, however it jumps about meanwhile: what leaves fewest jumps, and then most rows.
-
-    A jump may end what lasts for longer, or be what a single row does.
-    """
-    lasting, single = jumps(pose, 1.0, command)
-    jumped = sorted({*lasting, *single})
-    step = _beyond_motion(pose, jumped)
-    alone = [(row, row + 1, float(np.hypot(*step[row - 1]))) for row in _singles(pose, jumped)]
-    ways = []
-    known: _Spans
-    for known in ([], alone) if alone else ([],):
-        rest = [i for i in jumped if i not in _ends(known)]
-        found = [*known, *_returns(pose, rest, set(single), step)]
-        found += _next_to_gaps(pose, [i for i in jumped if i not in _ends(found)])
-        left = len(set(jumped) - _ends(found))
-        ways.append((left, sum(end - first for first, end, _ in found), sorted(found)))
-    return min(ways)[2]
-
-
-def _ends(spans: _Spans) -> set[int]:
-    return {row for first, end, _ in spans for row in (first, end)}
-
-
-def _singles(pose: Series, jumped: Sequence[int]) -> list[int]:
-    """Return the rows that jump away alone, and back with the next."""
-    out: list[int] = []
-    for i in jumped:
-        if i + 1 in jumped and i - 1 not in out and _alone(pose, i):
-            out.append(i)
-    return out
-
-
-def _returns(pose: Series, jumped: Sequence[int], single: set[int], step: FloatArray) -> _Spans:
-    """Return the stretches from a jump to the one that brings it back; step (n - 1, 2) [m]: beyond the motion."""
-    found: _Spans = []
-    away, last = 0, 0  # rows at which it left, and jumped last
-    off, far = np.zeros(2), 0.0  # how far it is off, and was at most
-    for i in jumped:
-        if away in single and last == away and i > away + 1 and _alone(pose, away):
-            found.append((away, away + 1, far))  # its way back was no jump
-            away = 0
-        if not away or pose.t[i] - pose.t[away] >= _BACK:
-            away, off, far = i, np.zeros(2), 0.0
-        off, last = off + step[i - 1], i
-        far = max(far, float(np.hypot(*off)))
-        if np.hypot(*off) < _SAME * np.hypot(*step[away - 1]):
-            found.append((away, i, far))
-            away = 0
-    if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
-        found.append((away, away + 1, far))
-    return found
-
-
-def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, int, float]]:
-    """Yield the same of the few rows between a jump and a gap, or an end: where it came from, or went to, is hidden."""
-    lasts = np.diff(pose.t)
-    gaps = [0, *(np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist(), len(pose.t)]
-    for i in jumped:
-        far = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
-        yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= _NEAR)
-
-
-def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
-    """Return by how much each row (n - 1, 2) [m] is off the one before, beyond what the rows about jumps move."""
-    step, lasts = np.diff(pose.values[:, :2], axis=0), np.diff(pose.t)[:, np.newaxis]
-    quiet = np.setdiff1d(np.arange(1, len(pose.t)), jumped)
-    if not len(quiet):
-        return step
-    rates = (step / lasts)[quiet - 1]
-    return np.asarray(step - lasts * np.column_stack([np.interp(pose.t[1:], pose.t[quiet], one) for one in rates.T]))
-
-
-def _alone(pose: Series, row: int) -> bool:
-    """Tell whether the row after one that jumped is back where it jumped from."""
-    jump, left = pose.values[row : row + 2, :2] - pose.values[row - 1, :2]
-    return bool(np.hypot(*left) < _SAME * np.hypot(*jump))
-
-
-def _told(name: str, pose: Series, spans: _Spans, off: BoolArray) -> str:
+def _told(name: str, pose: Series, spans: Spans, off: BoolArray) -> str:
     first, end, far = spans[0]
     where = (
         f"t = {moment(float(pose.t[first]))} to {moment(float(pose.t[end - 1]))}"
@@ -243,76 +145,3 @@ def _excursions(left: FloatArray, times: FloatArray) -> list[tuple[int, int]]:
         if back and times[j + 1] - times[i] < _LONGEST and (size[between] < _QUIET * size[i]).all():
             found.append((int(i) + 1, int(j) + 1))
     return found
-
-
-def contacts(run: Run, model: Model) -> tuple[tuple[float, float], ...]:
-    """Return the spans of time [s] in which the chair was held, by a quantity that says so, else by its motion."""
-    spans = _said(run.covariates[TOPIC]) if TOPIC in run.covariates else _seen(run, model)
-    return _merged([(a - _MARGINS[0], b + _MARGINS[1]) for a, b in spans])
-
-
-def _said(series: Series) -> Iterator[tuple[float, float]]:
-    """Yield the spans in which a quantity is not 0; each value holds until the next."""
-    ends = np.append(series.t[1:], series.t[-1])
-    for a, b in zip(*stretches(series.values[:, 0] != 0), strict=True):
-        yield float(series.t[a]), float(ends[b - 1])
-
-
-def _seen(run: Run, model: Model) -> Iterator[tuple[float, float]]:
-    if run.pose is None or run.pose_source != "measured":
-        return
-    try:
-        drive = prepare(run, model)
-    except Error:
-        return
-    t = drive.start + GRID * np.arange(len(drive.v))
-    after = np.clip(np.searchsorted(run.pose.t, t), 1, len(run.pose.t) - 1)
-    inside = (t > drive.times[0] + _WINDOW) & (t < drive.times[-1] - _WINDOW)
-    inside &= run.pose.t[after] - run.pose.t[after - 1] < _WINDOW  # nobody knows what is within a gap
-    asked = np.column_stack([drive.v, drive.w])
-    ends = (geometry.interpolate(run.pose.t, run.pose.values[:, :3], t + by) for by in (-_WINDOW / 2, _WINDOW / 2))
-    driven = np.abs(geometry.between(*ends)[:, [0, 2]] / _WINDOW)
-    late = _BEFORE + _answer(np.abs(asked[inside]), driven[inside])
-    wanted = _held((np.abs(asked) > _ASKED).any(axis=1), round(late / GRID))
-    small = np.maximum(_STANDS * np.abs(asked), _STANDS * _ASKED)
-    sds = third_difference_sd(run.pose.values[:, :3]) if len(run.pose.t) > 3 else np.zeros(3)
-    sds = np.sqrt(2) / _WINDOW * np.array([max(sds[:2]), sds[2]])  # of rates, by errors that differ from row to row
-    small = np.minimum(np.hypot(small, _NOISE * sds), np.maximum(_MOST_SEEN * _ASKED, small))
-    stands = inside & wanted & (driven < small).all(axis=1)
-    for a, b in zip(*stretches(stands), strict=True):
-        if (b - a) * GRID >= _LEAST and _is_odd(asked[a:b], asked, wanted, stands):
-            yield float(t[a]), float(t[b - 1])
-
-
-def _is_odd(here: FloatArray, asked: FloatArray, wanted: BoolArray, stands: BoolArray) -> bool:
-    """Tell whether the chair moves elsewhere when about the same is asked for."""
-    size = np.maximum(np.median(np.abs(here), axis=0), _ASKED)
-    as_much = (np.abs(asked) < _LIKE[1] * size).all(axis=1)
-    alike = wanted & as_much & (np.abs(asked) > _LIKE[0] * size).any(axis=1)
-    return bool(alike.any() and 1 - stands[alike].mean() >= _MOVES)
-
-
-def _answer(asked: FloatArray, driven: FloatArray) -> float:
-    """Return by how much [s] what is driven (n, 2) is behind what is asked, where they are most alike."""
-    one, other = (np.linalg.norm(rates / _ASKED, axis=1) for rates in (asked, driven))
-    shifts = [k for k in range(round(_LATEST / GRID) + 1) if k < len(one) - 1]
-    alike = [one[: len(one) - k] @ other[k:] / max(float(np.linalg.norm(one[: len(one) - k])), 1e-9) for k in shifts]
-    return GRID * shifts[int(np.argmax(alike))] if shifts else _LATEST
-
-
-def _held(flags: BoolArray, count: int) -> BoolArray:
-    """Return where flags (n,) have held for so many samples."""
-    sums = np.concatenate([[0], np.cumsum(flags)])
-    out = np.zeros_like(flags)
-    out[count - 1 :] = sums[count:] - sums[:-count] == count
-    return out
-
-
-def _merged(spans: list[tuple[float, float]]) -> tuple[tuple[float, float], ...]:
-    out: list[tuple[float, float]] = []
-    for a, b in sorted(spans):
-        if out and a <= out[-1][1]:
-            out[-1] = out[-1][0], max(out[-1][1], b)
-        else:
-            out.append((a, b))
-    return tuple(out)
