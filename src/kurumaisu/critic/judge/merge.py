@@ -24,6 +24,7 @@ from kurumaisu.critic.values.criticism import (
 from kurumaisu.critic.values.verdict import ChannelGain, Kind, Unknown, Verdict
 
 _NOTHING_SAID = "none"
+_SILENT = 1e-6  # [nat] of a reading, below which scans held out say nothing of what acts at edges, say, alone
 _PLACES = {"hit x": "x of the walls", "hit y": "y of the walls", "v": "forward speed", "w": "yaw rate"}
 _PLACES |= {"x": "x of the laser", "y": "y of the laser"}
 _POSES = {  # each against where the reference puts it: it may be wrong itself
@@ -148,8 +149,10 @@ def _without_faint(
         )
         rest = _without(finding, some.keys(), words)
         left = measure(rest.settings) if rest.settings else None
+        before, after = (0.0 if one is None else one.log_density_per_sample.gain for one in (left, gained))
+        silent = abs(after - before) < _SILENT
         alone = left is None and confirmed(gained, max(some.values()))
-        if not alone and (left is None or left.log_density_per_sample.gain >= gained.log_density_per_sample.gain):
+        if not silent and not alone and (left is None or before >= after):
             finding, gained = rest, left
     return finding, gained
 

@@ -29,6 +29,7 @@ from kurumaisu.types import FloatArray
 # as large, half the walls lie near those of the other one. The same where the map lacks a part of what is there, too.
 _ANOTHER, _ANOTHER_LACKS = 0.4, 0.2
 _SAME = 3.0  # sds of a constant error within which it is another form's
+_ROUNDED = 5e-4  # [m] half a step of usual readings, by which it differs if they were rounded before
 _RAMP, _ALIKE = 20000, 1e-4  # readings that show what an effect does; [m] by which near and far ones may differ
 _LACKS = 0.05  # share of readings of that part, at least
 _LISTED = 3
@@ -95,11 +96,11 @@ def with_scatter(
 
 
 def with_shifting_forms(
-    causes: Sequence[Cause], settings: Mapping[str, EffectSetting]
+    causes: Sequence[Cause], settings: Mapping[str, EffectSetting], uncertain: Sequence[Cause] = ()
 ) -> tuple[tuple[Cause, ...], tuple[EffectSetting, ...]]:
     """Return causes and settings with a constant error taken for what it is: another cause's, in another form.
 
-    Where a remainder is cut off, say, readings are too short by half a step.
+    Where a remainder is cut off, say, readings are too short by half a step. uncertain: what may be such an error.
     """
     for cause in causes:
         forms = effects.by_id(cause.id).forms
@@ -107,7 +108,7 @@ def with_shifting_forms(
             usual, other = (_constant({**settings[cause.id].parameters, **each}, cause.id) for each in (forms[0], form))
             if usual is None or other is None:
                 continue
-            for shift in causes:
+            for shift in (*causes, *uncertain):
                 if shift is not cause and _is_shift(shift, other - usual):
                     setting = EffectSetting(cause.id, {**settings[cause.id].parameters, **form})
                     whole = replace(cause, gain_nats=cause.gain_nats + shift.gain_nats)
@@ -125,7 +126,7 @@ def _is_shift(cause: Cause, by: float) -> bool:
     if low is None or high is None:
         return False
     sd = abs(high - low) / (2 * NORMAL90)
-    return abs(0.5 * (low + high) - by) < _SAME * sd < abs(by)
+    return abs(0.5 * (low + high) - by) < _SAME * sd + _ROUNDED and _SAME * sd < abs(by)
 
 
 def _constant(values: Mapping[str, float], name: str) -> float | None:

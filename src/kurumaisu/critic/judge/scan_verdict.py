@@ -243,7 +243,11 @@ def _finding(
     details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
     details += (f"laser: {passing.words}: its readings are set aside.",) if passing.many else ()
     causes, added = with_scatter(causes, settings, scatter.effects)
-    causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added})
+    open_ids = {name for group in confounded for name in group if name in estimates}
+    uncertain = [Cause(name, p[name], estimates[name], gain_of(made, name)) for name in sorted(open_ids)]
+    causes, added = with_shifting_forms(causes, {setting.id: setting for setting in added}, uncertain)
+    placed = open_ids - {setting.id for setting in added}
+    confounded = tuple(group for group in confounded if not placed & set(group))
     confounded += tuple(group for group in map(open_set, scatter.effects) if group)
     added += tuple(each.setting for each in scatter.curves[:1])
     nats, others = max((one.nats for one in scatter.curves), default=0.0), tuple(stand_ins(scatter.curves))

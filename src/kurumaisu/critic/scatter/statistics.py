@@ -186,7 +186,7 @@ class Statistics:
             Statistic("number of different values", count=False, off=False),
             Statistic("readings of the smallest value", count=True, off=True),
             Statistic("readings of the largest value", count=True, off=True),
-            Statistic("step between values", count=False, off=False),
+            Statistic("step between values", count=False, off=False, matters=1e-3),
             Statistic("lower cut-off of the readings", count=False, off=False),
             Statistic("upper cut-off of the readings", count=False, off=False),
         ]
@@ -318,13 +318,14 @@ def _counts(readings: FloatArray) -> IntArray:
 
 
 def _spacing(readings: FloatArray) -> float:
-    """Return the mean step [m] between values amid the readings, where every value of their grid occurs."""
+    """Return the mean step [m] between values amid the readings, where nearly every value of their grid occurs."""
     known = readings[np.isfinite(readings)]
     if not len(known):
         return _GRID
     low, high = np.quantile(known, _AMID)
-    steps = np.unique(np.rint(known[(known >= low) & (known <= high)] / _GRID))
-    return _GRID * float(np.ptp(steps)) / (len(steps) - 1) if len(steps) > 1 else _GRID
+    steps = np.diff(np.unique(np.rint(known[(known >= low) & (known <= high)] / _GRID)))
+    # Where readings are few some values are missing.
+    return _GRID * float(np.mean(steps[steps < 1.5 * np.median(steps)])) if len(steps) else _GRID
 
 
 def _share(hits: BoolArray) -> float:

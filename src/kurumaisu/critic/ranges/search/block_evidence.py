@@ -29,6 +29,7 @@ _PRUNED = 3  # best sets with a block that are pruned
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _NEAR = 30.0  # [nat] behind the likeliest, beyond which nobody asks what a curve draws
 _ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
+_AS_ALIKE = 0.01  # by which the correlation with another one's may be less, and nobody knows which of both it draws
 _ALIKE_OVER = float(np.sqrt(0.5))  # the same where both follow the same: half of what it does
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
@@ -133,7 +134,7 @@ def compare_blocks(
     rivals.sort(key=lambda rival: -rival.log_posterior)
     rivals = [*_pruned(rivals[:_PRUNED], known, doubted, shares), *rivals]
     rivals.sort(key=lambda rival: -rival.log_posterior)
-    singles = [fit for fit in found.fits if len(fit.forms) == 1 and effects.by_id(fit.forms[0].id).empirical]
+    singles = [fit for fit in found.fits if len(fit.forms) == 1]
     near = rivals[0].log_posterior - _NEAR if rivals else 0.0
     rivals = [replace(r, form_of=_form_of(r, singles, gram, families)) if r.log_posterior > near else r for r in rivals]
     plain = [(fit.ids, fit.score) for fit in found.fits]
@@ -278,9 +279,13 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
         pair = block_diag(drawn[:, np.newaxis], fit.coefficients[:, np.newaxis])
         (one, across), (_, other) = pair.T @ inner @ pair
         least = _ALIKE_OVER if follows == rival.free.basis.covariate else _ALIKE
-        alike.append((float(across / np.sqrt(one * other)) - least if min(one, other) > 0 else -1.0, form.id))
-    nearest, name = max(alike, default=(-1.0, ""))
-    return name if nearest >= 0.0 else None
+        least = least if effects.by_id(form.id).empirical else 1 - _AS_ALIKE  # it has no other form
+        share = float(across / np.sqrt(one * other)) if min(one, other) > 0 else 0.0
+        if share >= least:
+            alike.append((share, fit.score, form.id))
+    nearest = max(alike, default=(0.0, 0.0, ""))[0]
+    # Of two that a curve draws alike the likelier one: most of an offset is a warm-up over a long time, too.
+    return max(((score, name) for share, score, name in alike if share >= nearest - _AS_ALIKE), default=(0.0, None))[1]
 
 
 def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:
