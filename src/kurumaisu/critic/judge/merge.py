@@ -123,7 +123,7 @@ def _with_stand_in(rest: LaserFinding, before: LaserFinding, one: StandIn) -> La
 
 def _unresolved(before: LaserFinding, left: LaserFinding) -> LaserFinding:
     """Return what is left of a finding, amber where neither chance nor the map can have made what was refused."""
-    if before.nats < NO_NOISE:
+    if max([before.nats, *(cause.gain_nats for cause in before.causes)]) < NO_NOISE:
         return left
     gone = ", ".join(setting.id for setting in before.settings)
     shape = f"nearest is {gone}, which held-out scans refuse"

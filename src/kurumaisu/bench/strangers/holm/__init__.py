@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """holm: simulated recordings of a wheelchair in which something is hidden, made by the cause."""
-from .cases import make
+
+from kurumaisu.bench.strangers.holm.cases import make
 
 __all__ = ["make"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Draws a case of a kind, makes sure that it is strong enough, and writes it."""
+
 from __future__ import annotations
 
 import zlib
@@ -9,41 +10,55 @@ from typing import Any
 
 import numpy as np
 
-from . import faults, fog
-from .chair import Noise
-from .core import CORRECTED, PUBLISHED, Array, Effect, Law, Maker, chosen, log_uniform
-from .drives import Drive, Reference, Style, plan, reference, style
-from .judge import Judge
-from .laser import Fan
-from .record import Case, write
-from .rooms import Room, draw
-from .unknowns import EXTRA, WRONG, WRONG_SCANS, Pick, picks
+from kurumaisu.bench.strangers.holm import core
+from kurumaisu.bench.strangers.holm.chair import Noise
+from kurumaisu.bench.strangers.holm.core import CORRECTED, PUBLISHED, Array, Effect, Maker, chosen, log_uniform
+from kurumaisu.bench.strangers.holm.drives import Drive, Scene, plan, reference, style
+from kurumaisu.bench.strangers.holm.judge import Judge
+from kurumaisu.bench.strangers.holm.laser import Fan
+from kurumaisu.bench.strangers.holm.record import Case, write
+from kurumaisu.bench.strangers.holm.rooms import draw
+from kurumaisu.bench.strangers.holm.unknowns import EXTRA, PICKS, WRONG, WRONG_SCANS, Pick
 
-CONFOUNDED = [("base.gain_v", "forward"), ("base.curvature_v", "forward"), ("base.dac_zero_f", "forward"),
-              ("base.dead_zone_v", "forward"), ("base.reverse_gain", "reverse"), ("base.gain_w", "left"),
-              ("base.gain_w", "yaw"),
-              ("base.left_right_gain", "left"), ("base.dac_zero_s", "left"), ("base.curvature_w", "yaw"),
-              ("base.dead_zone_w", "yaw")]
-MOST = {"laser.mixed_pixels": 1.0, "laser.beam_correlation": 0.85, "laser.heavy_tails": 0.42, "laser.crosstalk": 0.9,
-        "laser.dropout": 0.4, "laser.saturation": 3.2, "laser.quantisation": 0.08, "base.steering_law": 1.0,
-        "base.saturation": 3.0,
-        "base.accel_limit": 5.0, "base.delay": 0.6, "base.lag_v": 1.0, "base.lag_w": 1.0, "base.payload": 0.4,
-        "base.dac_quantisation": 0.25, "laser.tilt": 0.2, "laser.sweep": 0.95, "laser.latency": 0.3,
-        "base.battery_sag": 0.002,
-        "base.dead_zone_v": 0.3, "base.dead_zone_w": 0.2, "laser.reflectance": 0.1, "base.backlash": 0.3,
-        "laser.common_mode": 0.04, "base.understeer": 1.2, "base.curvature_v": 0.6, "base.curvature_w": 0.5}
-STRONG = {"null": (0.0, 0.0), "single": (10.0, 6.0), "form": (10.0, 6.0), "pair": (10.0, 4.0), "triple": (10.0, 4.0),
-          "unknown": (10.0, 6.0), "confounded": (10.0, 0.0), "wrong": (0.0, 0.0)}
-ONLY: list[str] = []
+CONFOUNDED = [
+    ("base.gain_v", "forward"),
+    ("base.curvature_v", "forward"),
+    ("base.dac_zero_f", "forward"),
+    ("base.dead_zone_v", "forward"),
+    ("base.reverse_gain", "reverse"),
+    ("base.gain_w", "left"),
+    ("base.gain_w", "yaw"),
+    ("base.left_right_gain", "left"),
+    ("base.dac_zero_s", "left"),
+    ("base.curvature_w", "yaw"),
+    ("base.dead_zone_w", "yaw"),
+]
+_BASE = """dac_zero_f dac_zero_s cross_v_to_w gain_v gain_w left_right_gain veer reverse_gain caster_reversal
+cross_w_to_v slope marker_x marker_y marker_yaw clock_scale"""
+_LASER = """mount_x mount_y mount_yaw offset scale quadratic incidence_bias reflectance temperature latency clock_skew
+warmup"""
+SIGNED = {"base." + name for name in _BASE.split()} | {"laser." + name for name in _LASER.split()}
+STRONG = {
+    "null": (0.0, 0.0),
+    "single": (10.0, 6.0),
+    "form": (10.0, 6.0),
+    "pair": (10.0, 4.0),
+    "triple": (10.0, 4.0),
+    "unknown": (10.0, 6.0),
+    "confounded": (10.0, 0.0),
+    "wrong": (0.0, 0.0),
+}
+
 
 @dataclass
 class Wish:
     """A cause of a size that may change: what makes it, and its smallest and largest size."""
+
     name: str
     maker: Maker
     size: float
     sign: float
-    least: float = 0.0
+    least: float
 
     def effect(self, rng: np.random.Generator) -> Effect:
         """The cause at its present size."""
@@ -51,37 +66,38 @@ class Wish:
 
     def grow(self, factor: float) -> None:
         """Change the size, within what can be."""
-        if self.name not in ("base.steering_law", "laser.saturation"):
-            self.size = min(max(self.size * factor, self.least), MOST.get(self.name, np.inf))
         if self.name == "laser.saturation":
             self.size = float(np.clip(self.size / factor**0.2, 1.2, 3.5))
+        elif self.name != "base.steering_law":
+            self.size = min(max(self.size * factor, self.least), core.MOST.get(self.name, np.inf))
+
 
 def _wishes(rng: np.random.Generator, kind: str) -> tuple[list[Wish], str, Pick | None]:
     """What to hide, the driver's habit, and an unknown."""
     if kind in ("null", "wrong"):
         return [], "normal", None
     if kind == "unknown":
-        pick = chosen(rng, picks())
-        return [Wish("unknown", lambda x, _: pick[3](x), pick[4] * log_uniform(rng, 0.7, 2), chosen(rng, (-1, 1)),
-                     pick[4] * log_uniform(rng, 0.35, 1.2))], "normal", pick
+        pick: Pick = chosen(rng, PICKS)
+        size, sign = pick.size * log_uniform(rng, 0.7, 2), chosen(rng, (-1, 1))
+        least = pick.size * log_uniform(rng, 0.35, 1.2)
+        return [Wish("unknown", lambda x, _: pick.effect(x), size, sign, least)], "normal", pick
     if kind == "confounded":
         name, mode = chosen(rng, CONFOUNDED)
-        names, source = [name], faults.USUAL
+        names, source = [name], core.USUAL
     else:
-        source = {**faults.OTHER, **fog.OTHER} if kind == "form" else {**faults.USUAL, **fog.USUAL}
-        pool = [n for n in sorted(source) if not ONLY or n in ONLY]
+        source = core.OTHER if kind == "form" else core.USUAL
         count = {"pair": 2, "triple": 3}.get(kind, 1)
-        names, mode = [str(x) for x in rng.choice(pool, count, replace=False)], "normal"
+        names, mode = [str(x) for x in rng.choice(sorted(source), count, replace=False)], "normal"
     out = []
     for name in names:
         size, maker = source[name]
-        short = name.split(".")[1]
-        signed = short in (faults.SIGNED if name.startswith("base") else fog.SIGNED) or short == "map_error"
-        sign = chosen(rng, (-1, 1)) if signed and not (kind == "form" and short == "map_error") else 1
+        signed = name in SIGNED or (name == "world.map_error" and kind != "form")
+        sign = chosen(rng, (-1, 1)) if signed else 1
         wish = Wish(name, maker, size, sign, size * log_uniform(rng, 0.35, 1.5))
         wish.grow(log_uniform(rng, 0.6, 2))
         out.append(wish)
     return out, mode, None
+
 
 def _swing(rng: np.random.Generator, name: str, duration: float) -> Array:
     middle, half = EXTRA[name]
@@ -89,21 +105,9 @@ def _swing(rng: np.random.Generator, name: str, duration: float) -> Array:
     wave = np.sin(2 * np.pi * t / rng.uniform(60, 130) + rng.uniform(0, 6))
     return np.asarray(middle + half * (wave + rng.normal(0, 0.02, t.size)))
 
-@dataclass
-class Scene:
-    """What stays while sizes are changed."""
-    room: Room | None
-    fan: Fan | None
-    law: Law
-    noise: Noise
-    ref: Reference
-    style: Style
-    durations: list[float]
-    scan_rate: float
-    extra: list[str]
 
-def _scene(rng: np.random.Generator, kind: str, wishes: list[Wish], mode: str, pick: Pick | None) -> Scene:
-    laser = pick[2] == "laser" if pick else any(not w.name.startswith("base") for w in wishes)
+def _scene(rng: np.random.Generator, wishes: list[Wish], mode: str, pick: Pick | None) -> Scene:
+    laser = pick.channel.startswith("laser") if pick else any(not w.name.startswith("base") for w in wishes)
     with_scans = laser or (mode == "normal" and rng.random() < 0.4)
     room = draw(rng) if with_scans else None
     fan = None
@@ -115,16 +119,17 @@ def _scene(rng: np.random.Generator, kind: str, wishes: list[Wish], mode: str, p
     ids = {w.name for w in wishes}
     volts = ids & {"base.dac_zero_s", "base.dead_zone_w", "base.cross_v_to_w", "base.dac_quantisation"}
     law = PUBLISHED if "base.steering_law" in ids or (not volts and rng.random() < 0.25) else CORRECTED
-    noise = Noise(log_uniform(rng, 0.004, 0.016), log_uniform(rng, 0.008, 0.03), log_uniform(rng, 0.1, 0.6),
-                  bool(rng.random() < 0.5))
+    sizes = log_uniform(rng, 0.004, 0.016), log_uniform(rng, 0.008, 0.03), log_uniform(rng, 0.1, 0.6)
+    noise = Noise(*sizes, bool(rng.random() < 0.5))
     count = int(rng.integers(3, 5))
     low, high = (60, 130) if with_scans else (70, 240 if count < 4 else 160)
     durations = [float(round(rng.uniform(low, high), 1)) for _ in range(count)]
     total = sum(durations) * (fan.beams if fan else 1)
     rate = float(min(chosen(rng, (10, 5, 4, 8)), max(2.0, 700000 / total)))
-    names = ["temperature"] if any(w.name == "laser.temperature" for w in wishes) else []
-    names += [n for n in (pick[1] if pick else []) if n in EXTRA]
+    names = ["temperature"] if "laser.temperature" in ids else []
+    names += [pick.follows] if pick and pick.follows in EXTRA else []
     return Scene(room, fan, law, noise, reference(rng), style(rng, room, mode), durations, rate, names)
+
 
 def _drives(seed: int, sc: Scene, effects: list[Effect], only_train: bool) -> list[Drive]:
     rng = np.random.default_rng(seed)
@@ -135,7 +140,7 @@ def _drives(seed: int, sc: Scene, effects: list[Effect], only_train: bool) -> li
         extra = {n: _swing(rng, n, duration) for n in sc.extra}
         child = np.random.default_rng(int(rng.integers(1 << 40)))
         if not (only_train and test):
-            d = plan(child, f"run_{k + 1}", sc.style, duration, start, sc.room, effects, sc.noise, sc.law, extra)
+            d = plan(child, f"run_{k + 1}", sc, duration, start, effects, extra)
             d.test = test
             if sc.fan is not None:
                 t = np.arange(0.7, duration - 0.7, 1 / sc.scan_rate)
@@ -144,16 +149,18 @@ def _drives(seed: int, sc: Scene, effects: list[Effect], only_train: bool) -> li
         start += round(duration + float(rng.uniform(10, 60)), 1)
     return out
 
-def _strong(rng: np.random.Generator, kind: str, wishes: list[Wish], sc: Scene) -> tuple[list[Drive], list[Effect],
-                                                                                     list[tuple[float, float]]] | None:
+
+Strong = tuple[list[Drive], list[Effect], list[tuple[float, float]]]
+
+
+def _strong(rng: np.random.Generator, kind: str, wishes: list[Wish], sc: Scene) -> Strong | None:
     z_least, beside_least = STRONG[kind]
     seed = int(rng.integers(1 << 40))
     goal = log_uniform(rng, 1.3, 5)
     for attempt in range(4):
         effects = [w.effect(np.random.default_rng(seed + k)) for k, w in enumerate(wishes)]
         drives = _drives(seed, sc, effects, True)
-        judge = Judge(drives, sc.noise, sc.ref, sc.law, sc.room, sc.fan)
-        found = judge.strength(effects, np.random.default_rng(seed))
+        found = Judge(drives, sc).strength(effects, np.random.default_rng(seed))
         good = all(z >= z_least and b >= beside_least for z, b in found)
         if kind == "confounded" and good and any(b >= 1 for _, b in found):
             return None
@@ -164,26 +171,32 @@ def _strong(rng: np.random.Generator, kind: str, wishes: list[Wish], sc: Scene) 
             return None
         for w, (z, b) in zip(wishes, found, strict=True):
             need = max(z_least / z, beside_least / max(b, 0.1) if beside_least else 0)
-            factor = need * goal
-            w.grow(float(np.clip(factor, 0.1, 6)))
+            w.grow(float(np.clip(need * goal, 0.1, 6)))
     return None
 
-def _truth(kind: str, effects: list[Effect], found: list[tuple[float, float]], pick: Pick | None, tamper: str,
-           dead: bool,
-           sc: Scene) -> dict[str, Any]:
-    causes = [] if pick else [
-        {"id": e.id, "z": round(z, 2), "beside": round(b, 2), "form": "other" if kind == "form" else "usual",
-         "parameters": {} if kind == "form" else {k: round(v, 6) for k, v in e.parameters.items()}}
-        for e, (z, b) in zip(effects, found, strict=True)]
-    neutral = ["base.process_noise"] + (["laser.dropout"] if dead else [])
-    unknown = None
+
+def _truth(kind: str, made: Strong, pick: Pick | None, tamper: str, dead: bool, sc: Scene) -> dict[str, Any]:
+    _, effects, found = made
+    sizes = [{"z": round(z, 2), "beside": round(beside, 2)} for z, beside in found]
+    form, unknown, causes = "other" if kind == "form" else "usual", None, []
     words = " and ".join(e.id for e in effects) or tamper or "nothing"
     if pick:
-        unknown = {"channel": pick[0], "covariates": pick[1], "z": round(found[0][0], 2),
-                   "beside": round(found[0][1], 2)}
-        words = f"{pick[5]}: {pick[0]} follows {pick[1][0]}"
-    return {"kind": kind, "causes": causes, "neutral": neutral, "unknown": unknown, "wrong": tamper or None,
-            "sentence": f"A chair watched by a {sc.ref.kind}; hidden: {words}."}
+        follows = pick.follows.split()
+        unknown = {"channel": pick.channel, "covariates": follows, **sizes[0]}
+        words = f"{pick.says}: {pick.channel} follows {follows[0]}"
+    else:
+        for e, size in zip(effects, sizes, strict=True):
+            parameters = {} if kind == "form" else {k: round(v, 6) for k, v in e.parameters.items()}
+            causes.append({"id": e.id, **size, "form": form, "parameters": parameters})
+    return {
+        "kind": kind,
+        "causes": causes,
+        "neutral": ["base.process_noise"] + (["laser.dropout"] if dead else []),
+        "unknown": unknown,
+        "wrong": tamper or None,
+        "sentence": f"A chair watched by a {sc.ref.kind}; hidden: {words}.",
+    }
+
 
 def make(folder: Path, kind: str, seed: int) -> None:
     """Write the case of a kind and seed into folder; RuntimeError if none of 30 draws is strong enough."""
@@ -192,27 +205,24 @@ def make(folder: Path, kind: str, seed: int) -> None:
     for draw_number in range(30):
         rng = np.random.default_rng([zlib.crc32(kind.encode()), seed, draw_number])
         wishes, mode, pick = _wishes(rng, kind)
-        sc = _scene(rng, kind, wishes, mode, pick)
-        tamper = ""
-        if kind == "wrong":
-            tamper = chosen(rng, WRONG + (WRONG_SCANS * 2 if sc.fan else []))
+        sc = _scene(rng, wishes, mode, pick)
+        tamper = chosen(rng, WRONG + (WRONG_SCANS * 2 if sc.fan else [])) if kind == "wrong" else ""
+        made: Strong | None
         if wishes:
             made = _strong(rng, kind, wishes, sc)
-            if made is None:
-                continue
-            drives, effects, found = made
         else:
-            drives, effects, found = _drives(int(rng.integers(1 << 40)), sc, [], False), [], []
-        dead = np.zeros(0, dtype=int)
-        if sc.fan is not None and rng.random() < 0.4 and not any(e.id == "laser.dropout" for e in effects):
-            dead = rng.choice(sc.fan.beams, int(rng.integers(1, 4)), replace=False)
-        names = ["battery", "cpu_load", "lab_light", "wifi"]
-        decoys = [str(x) for x in rng.choice(names, int(rng.integers(0, 4)), replace=False)]
-        zero = float(chosen(rng, (0.0, 0.0, 12.5, 1.7e9 + 86400 * int(rng.integers(300)))))
-        case = Case(drives, effects, sc.noise, sc.ref, sc.law, sc.room, sc.fan, sc.scan_rate, zero,
-                    (rng.random() < 0.6 or tamper == "voltages in mV") and tamper != "commands in km/h", decoys, dead,
-                    tamper,
-                    bool(rng.random() < 0.5))
-        write(Path(folder), case, _truth(kind, effects, found, pick, tamper, dead.size > 0, sc), rng)
-        return
-    raise RuntimeError(f"no {kind} of seed {seed} is strong enough")
+            made = _drives(int(rng.integers(1 << 40)), sc, [], False), [], []
+        if made:
+            break
+    else:
+        raise RuntimeError(f"no {kind} of seed {seed} is strong enough")
+    drives, effects, _ = made
+    dead = np.zeros(0, dtype=int)
+    if sc.fan is not None and rng.random() < 0.4 and not any(e.id == "laser.dropout" for e in effects):
+        dead = rng.choice(sc.fan.beams, int(rng.integers(1, 4)), replace=False)
+    names = ["battery", "cpu_load", "lab_light", "wifi"]
+    decoys = [str(x) for x in rng.choice(names, int(rng.integers(0, 4)), replace=False)]
+    zero = float(chosen(rng, (0.0, 0.0, 12.5, 1.7e9 + 86400 * int(rng.integers(300)))))
+    voltages = (rng.random() < 0.6 or tamper == "voltages in mV") and tamper != "commands in km/h"
+    case = Case(drives, effects, sc, zero, voltages, decoys, dead, tamper, says=bool(rng.random() < 0.5))
+    write(Path(folder), case, _truth(kind, made, pick, tamper, dead.size > 0, sc), rng)

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The laser: where its beams end, what they read on average, and how readings scatter."""
+
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
@@ -7,16 +8,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .core import Array, Effect
-from .rooms import Room
+from kurumaisu.bench.strangers.holm.core import Array, Effect
+from kurumaisu.bench.strangers.holm.rooms import Room
 
 SCALE, DATUM, SIGMA = 1.004587, 0.058826, (0.002334, -0.000488, 0.000199)
 STEP, NEAR, FAR, HEIGHT = 0.001, 0.06, 4.0, 0.40
 Poses = Callable[[Array], Array]
 
+
 @dataclass(frozen=True)
 class Fan:
     """Where the laser is and what it sees."""
+
     x: float
     y: float
     yaw: float
@@ -25,28 +28,28 @@ class Fan:
     beams: int
     time_increment: float
 
+
 @dataclass
 class Look:
     """Scans: every array is (scans, beams), or (scans, 1) of a whole scan."""
+
     stamp: Array
     session: Array
     parity: Array
-    beam: Array
     bearing: Array
     pose: Array
     direction: Array
     r: Array
     cos: Array
     shine: Array
-    wall: Array
     hit_x: Array
-    hit_y: Array
     mu: Array
     sd: Array
-    extra: dict[str, Array] = field(default_factory=dict)
+    extra: dict[str, Array]
     common: Array | None = None
     error: Array = field(default_factory=lambda: np.zeros(0))
     read: Array = field(default_factory=lambda: np.zeros(0))
+    rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(0))
 
     @property
     def valid(self) -> Array:
@@ -58,18 +61,26 @@ class Look:
         """Angle between beam and the wall's normal."""
         return np.asarray(np.arccos(np.clip(self.cos, 0, 1)), dtype=float)
 
-def sigma(r: Array) -> Array:
-    """Equation 4's scatter at true range r."""
-    return SIGMA[0] + SIGMA[1] * r + SIGMA[2] * r * r
 
-def look(room: Room, poses: Poses, stamps: Array, fan: Fan, effects: Sequence[Effect], *, beams: Array | None = None,
-         start: float = 0.0, index: Array | None = None, extra: dict[str, tuple[Array, Array]] | None = None) -> Look:
+def look(
+    room: Room,
+    poses: Poses,
+    stamps: Array,
+    fan: Fan,
+    effects: Sequence[Effect],
+    *,
+    beams: Array | None = None,
+    start: float = 0.0,
+    index: Array | None = None,
+    extra: dict[str, Array] | None = None,
+) -> Look:
     """What the laser reads on average in scans stamped so; poses gives the chair's pose at true times."""
     beam = np.arange(fan.beams) if beams is None else beams
     mine = [e for e in effects if e.hook in ("mount", "stamps", "sweep", "tilt", "room")]
 
     def get(key: str) -> float:
         return sum(e.settings.get(key, 0.0) for e in mine)
+
     session = stamps + start
     began = stamps - get("delay") - get("skew") * session
     t = began[:, None] + beam * fan.time_increment * (1 + get("stretch"))
@@ -94,44 +105,46 @@ def look(room: Room, poses: Poses, stamps: Array, fan: Fan, effects: Sequence[Ef
             floor = np.where(down > 1e-6, HEIGHT / np.sin(np.maximum(down, 1e-9)), np.inf)
         r = np.minimum(r / np.cos(down), floor)
     shine = np.where(face >= 0, room.shine[face], 1.0)
-    wall = np.where(face >= 0, room.owner[face], -1).astype(float)
-    with np.errstate(invalid="ignore", over="ignore"):
-        far = np.where(np.isfinite(r), r, 99.0)
-        mu = np.where(np.isfinite(r), SCALE * r + DATUM, np.inf)
+    far, near = np.where(np.isfinite(r), r, 99.0), np.minimum(r, 8)
     parity = (np.arange(stamps.size) if index is None else index) % 2
-    found = Look(stamps[:, None], session[:, None], parity[:, None],
-                 beam + np.zeros_like(t), bearing, pose, direction, far, cos, shine, wall, ox + far * np.cos(direction),
-                 oy + far * np.sin(direction), mu, sigma(np.minimum(far, 8)),
-                 {k: np.interp(stamps, v[0], v[1])[:, None] for k, v in (extra or {}).items()})
-    for e in effects:
-        if e.hook == "mean":
-            e.act(found)
-    for e in effects:
-        if e.hook == "spread":
-            e.act(found)
+    found = Look(
+        stamps[:, None],
+        session[:, None],
+        parity[:, None],
+        bearing,
+        pose,
+        direction,
+        far,
+        cos,
+        shine,
+        ox + far * np.cos(direction),
+        SCALE * r + DATUM,
+        SIGMA[0] + SIGMA[1] * near + SIGMA[2] * near * near,
+        {k: np.interp(stamps, np.arange(v.size), v)[:, None] for k, v in (extra or {}).items()},
+    )
+    for hook in ("mean", "spread"):
+        for e in effects:
+            if e.hook == hook:
+                e.act(found)
     return found
+
 
 def read(seen: Look, effects: Sequence[Effect], rng: np.random.Generator) -> Array:
     """Readings: nan for no valid one, inf for no return."""
-    shape = seen.mu.shape
-    scatter = [e for e in effects if e.hook in ("error", "reading", "last")]
-    seen.error = rng.standard_normal(shape)
-    for e in scatter:
-        if e.hook == "error":
-            e.settings["seed"] = float(rng.integers(1 << 30))
-            e.act(seen)
+
+    def act(hook: str) -> None:
+        for e in effects:
+            if e.hook == hook:
+                seen.rng = np.random.default_rng(int(rng.integers(1 << 30)))
+                e.act(seen)
+
+    seen.error = rng.standard_normal(seen.mu.shape)
+    act("error")
     common = 0.0 if seen.common is None else seen.common
-    seen.read = np.where(np.isfinite(seen.mu), seen.mu + seen.sd * seen.error + common, np.inf)
-    for e in scatter:
-        if e.hook == "reading":
-            e.settings["seed"] = float(rng.integers(1 << 30))
-            e.act(seen)
+    seen.read = seen.mu + seen.sd * seen.error + common
+    act("reading")
     with np.errstate(invalid="ignore"):
         out = np.round(seen.read / STEP) * STEP
-        out = np.where(out < NEAR, np.nan, np.where(out > FAR, np.inf, out))
-    seen.read = out
-    for e in scatter:
-        if e.hook == "last":
-            e.settings["seed"] = float(rng.integers(1 << 30))
-            e.act(seen)
+        seen.read = np.where(out < NEAR, np.nan, np.where(out > FAR, np.inf, out))
+    act("last")
     return np.asarray(seen.read)

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rooms of boxes: how they are drawn, written as a Stage world, and met by rays."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .core import Array, chosen
+from kurumaisu.bench.strangers.holm.core import Array, chosen
 
 
 @dataclass(frozen=True)
 class Box:
     """A block of the world, centre and size [m], turned by yaw."""
+
     x: float
     y: float
     sx: float
@@ -19,24 +21,23 @@ class Box:
     yaw: float
     shine: float
 
+
 @dataclass
 class Room:
-    """Boxes, with their faces as segments (n, 2, 2) and which box a face is of."""
+    """Boxes, with their faces as segments (n, 2, 2) and how those shine."""
+
     boxes: list[Box]
     size: tuple[float, float]
 
     def __post_init__(self) -> None:
-        faces, owner = [], []
-        for i, b in enumerate(self.boxes):
+        faces = []
+        for b in self.boxes:
             c, s = np.cos(b.yaw), np.sin(b.yaw)
             corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [b.sx / 2, b.sy / 2]
             corners = corners @ np.array([[c, s], [-s, c]]) + [b.x, b.y]
-            for k in range(4):
-                faces.append([corners[k], corners[(k + 1) % 4]])
-                owner.append(i)
+            faces += [[corners[k], corners[(k + 1) % 4]] for k in range(4)]
         self.faces = np.array(faces)
-        self.owner = np.array(owner)
-        self.shine = np.array([b.shine for b in self.boxes])[self.owner]
+        self.shine = np.repeat([b.shine for b in self.boxes], 4)
 
     def clear(self, points: Array) -> float:
         """Distance of the nearest face to any of the points (n, 2)."""
@@ -69,8 +70,10 @@ class Room:
 
     def scaled(self, factor: float, shifts: Array) -> Room:
         """The room as it really is: all lengths by factor, each box moved by its shift (n, 2)."""
-        moved = [replace(b, x=b.x * factor + s[0], y=b.y * factor + s[1], sx=b.sx * factor, sy=b.sy * factor)
-                 for b, s in zip(self.boxes, shifts, strict=True)]
+        moved = [
+            replace(b, x=b.x * factor + s[0], y=b.y * factor + s[1], sx=b.sx * factor, sy=b.sy * factor)
+            for b, s in zip(self.boxes, shifts, strict=True)
+        ]
         return Room(moved, self.size)
 
     def world(self) -> str:
@@ -78,20 +81,27 @@ class Room:
         lines = ['define wall model\n(\n  size [1.0 1.0 1.5]\n  ranger_return 1.0\n  color "grey60"\n)\n']
         for b in self.boxes:
             grey = "white" if b.shine > 0.75 else "grey60" if b.shine > 0.4 else "grey20"
-            lines.append(f"wall ( pose [{b.x:.4f} {b.y:.4f} 0 {np.degrees(b.yaw):.4f}] "
-                         f"size [{b.sx:.4f} {b.sy:.4f} 1.5] "
-                         f'ranger_return {b.shine:.2f} color "{grey}" )')
+            lines.append(
+                f"wall ( pose [{b.x:.4f} {b.y:.4f} 0 {np.degrees(b.yaw):.4f}] "
+                f"size [{b.sx:.4f} {b.sy:.4f} 1.5] "
+                f'ranger_return {b.shine:.2f} color "{grey}" )'
+            )
         return "\n".join(lines) + "\n"
+
 
 def draw(rng: np.random.Generator) -> Room:
     """A room, a hall with pillars, or a corridor; origin near its middle."""
     kind = chosen(rng, ("room", "hall", "corridor", "room"))
-    lx, ly = {"room": (rng.uniform(4.5, 7), rng.uniform(4, 6)), "hall": (rng.uniform(7, 10), rng.uniform(6, 8)),
-              "corridor": (rng.uniform(9, 14), rng.uniform(2.6, 3.4))}[kind]
+    lx, ly = {
+        "room": (rng.uniform(4.5, 7), rng.uniform(4, 6)),
+        "hall": (rng.uniform(7, 10), rng.uniform(6, 8)),
+        "corridor": (rng.uniform(9, 14), rng.uniform(2.6, 3.4)),
+    }[kind]
     thick = 0.12
 
     def shade() -> float:
         return float(chosen(rng, (0.9, 0.9, 0.6, 0.3, 0.15)))
+
     boxes = []
     for side in (-1, 1):
         skew = rng.uniform(-0.06, 0.06) if rng.random() < 0.4 else 0.0
@@ -112,7 +122,20 @@ def draw(rng: np.random.Generator) -> Room:
         if np.hypot(*place) > 1.5:
             wide = rng.uniform(0.2, 0.5)
             boxes.append(Box(place[0], place[1], wide, wide, rng.uniform(0, 1.5), shade()))
-    for wall in {True: [], False: [rng.uniform(0.3, 1)]}[rng.random() < 0.6]:
+    wall = rng.uniform(0.3, 1)
+    if rng.random() >= 0.6:
         boxes.append(Box(0.42 * lx, 0.42 * ly, 0.1, 1.2 * wall + 0.6, float(rng.uniform(0.4, 1.1)), shade()))
-    return Room([replace(b, x=round(b.x, 3), y=round(b.y, 3), yaw=float(np.radians(round(np.degrees(b.yaw), 3))),
-                         sx=round(b.sx, 3), sy=round(b.sy, 3)) for b in boxes], (lx, ly))
+    return Room(
+        [
+            replace(
+                b,
+                x=round(b.x, 3),
+                y=round(b.y, 3),
+                yaw=float(np.radians(round(np.degrees(b.yaw), 3))),
+                sx=round(b.sx, 3),
+                sy=round(b.sy, 3),
+            )
+            for b in boxes
+        ],
+        (lx, ly),
+    )

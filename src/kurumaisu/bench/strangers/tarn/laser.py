@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rooms built around the paths that were driven; what a laser reads in them: mean and scatter."""
+
+from __future__ import annotations
+
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -9,21 +12,25 @@ from scipy.signal import lfilter
 from scipy.special import ndtr
 from scipy.stats import t as student
 
-from .base import Array, Drive, Effects, Ints, Lab, Laser, Pose, Rng, curve
+from kurumaisu.bench.strangers.tarn.base import Array, Drive, Effects, Ints, Lab, Laser, Pose, Rng, curve
 
 THICK, CORNERS = 0.2, ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))
 
+
 class Room(NamedTuple):
     """Boxes: centre x, y, angle, length, width, reflectance; the map's pixel, 0 if it is a world."""
+
     boxes: Array
     pixel: float
+
     def segments(self) -> Array:
         """Rows of ax, ay, ex, ey: four sides of each box."""
         x, y, a, long, w = self.boxes[:, :5].T
         c, s = np.cos(a) / 2, np.sin(a) / 2
         p = np.array([(x + c * i * long - s * j * w, y + s * i * long + c * j * w) for i, j in CORNERS])
         return np.asarray(np.concatenate([p[:-1], np.diff(p, axis=0)], 1).transpose(0, 2, 1).reshape(-1, 4))
-    def moved(self, scale: float, sd: float, swell: float) -> "Room":
+
+    def moved(self, scale: float, sd: float, swell: float) -> Room:
         """The room as it is, if the map is off: larger by a share, or with every box shifted."""
         b = self.boxes.copy()
         b[:, :2] *= 1 + scale + swell * np.hypot(b[:, 0:1], b[:, 1:2])
@@ -31,18 +38,22 @@ class Room(NamedTuple):
         b[:, :2] += sd * np.random.default_rng(len(b)).normal(size=(len(b), 2))
         return Room(b, self.pixel)
 
+
 def _wall(a: Array, b: Array, shade: float) -> list[float]:
     long, turn = float(np.hypot(*(b - a))), float(np.arctan2(*(b - a)[::-1]))
     x, y = (a + b) / 2 + np.array([np.sin(turn), -np.cos(turn)]) * THICK / 2
     return [float(x), float(y), turn, long + 2 * THICK, THICK, shade]
 
+
 def build(rng: Rng, lab: Lab, px: Array, py: Array) -> Room:
     """Walls around all that was driven, with boxes where nothing was driven."""
     path, free, m, out = np.stack([px, py], 1), lab.pixel == 0, lab.margin, np.array(CORNERS[:4])
     lo, hi = path.min(0) - m - rng.uniform(0.1, 0.8, 2), path.max(0) + m + rng.uniform(0.1, 0.8, 2)
-    if not free: lo, hi = np.floor(lo * 10) / 10, np.ceil(hi * 10) / 10
+    if not free:
+        lo, hi = np.floor(lo * 10) / 10, np.ceil(hi * 10) / 10
     corner = np.where(out > 0, hi, lo)
-    if lab.room == "askew": corner = corner + out * rng.uniform(0, 0.25, (4, 2)) * (hi - lo)
+    if lab.room == "askew":
+        corner = corner + out * rng.uniform(0, 0.25, (4, 2)) * (hi - lo)
     rows = [_wall(corner[k], corner[(k + 1) % 4], rng.uniform(0.15, 1) if free else 1.0) for k in range(4)]
     many, size = {"office": (14, 0.8), "corridor": (16, 0.5), "hall": (12, 0.35), "askew": (10, 0.6)}[lab.room]
     for _ in range(400):
@@ -58,6 +69,7 @@ def build(rng: Rng, lab: Lab, px: Array, py: Array) -> Room:
         if gap.min() > m and len(rows) < 4 + many:
             rows.append([float(c[0]), float(c[1]), a, n, w, rng.uniform(0.1, 1.0) if free else 1.0])
     return Room(np.asarray(rows), lab.pixel)
+
 
 def cast(room: Room, ox: Array, oy: Array, dx: Array, dy: Array) -> tuple[Array, Ints, Array]:
     """Range, segment and cosine of incidence of each ray; inf and -1 where nothing is met."""
@@ -75,14 +87,17 @@ def cast(room: Room, ox: Array, oy: Array, dx: Array, dy: Array) -> tuple[Array,
     r, hit, cosi = np.concatenate(parts, 1)
     return r, hit.astype(np.int64), cosi
 
+
 def write_room(room: Room, folder: Path) -> str:
     """A Stage world, or a map with fine pixels; the name for meta.yaml."""
     b, p = room.boxes, room.pixel
     if p == 0:
         out = ['define thing model ( color "gray30" obstacle_return 1 gui_nose 0 )']
         for x, y, a, n, w, shade in b:
-            out.append(f'thing ( pose [ {x:.6f} {y:.6f} 0 {np.degrees(a):.6f} ] size [ {n:.6f} {w:.6f} 1.5 ] '
-                       f'ranger_return {shade:.3f} color "gray{int(20 + 70 * shade)}" )')
+            out.append(
+                f"thing ( pose [ {x:.6f} {y:.6f} 0 {np.degrees(a):.6f} ] size [ {n:.6f} {w:.6f} 1.5 ] "
+                f'ranger_return {shade:.3f} color "gray{int(20 + 70 * shade)}" )'
+            )
         (folder / "room.world").write_text("\n".join(out) + "\n")
         return "room.world"
     half = np.where(np.abs(np.cos(b[:, 2:3])) > 0.7, b[:, 3:5], b[:, 4:2:-1]) / 2
@@ -90,27 +105,53 @@ def write_room(room: Room, folder: Path) -> str:
     lo, hi = (np.round((b[:, :2] + e * half - origin) / p).astype(int) for e in (-1, 1))
     nx, ny = hi.max(0) + int(0.2 / p)
     image = np.full((ny, nx), 254, np.uint8)
-    for (i0, j0), (i1, j1) in zip(np.maximum(lo, 0), hi): image[j0:j1, i0:i1] = 0
+    for (i0, j0), (i1, j1) in zip(np.maximum(lo, 0), hi, strict=True):
+        image[j0:j1, i0:i1] = 0
     (folder / "room.pgm").write_bytes(b"P5\n%d %d\n255\n" % (nx, ny) + image[::-1].tobytes())
     (folder / "room.yaml").write_text(
         f"image: room.pgm\nresolution: {p}\norigin: [{origin[0]:.6f}, {origin[1]:.6f}, 0.0]\nnegate: 0\n"
-        "occupied_thresh: 0.65\nfree_thresh: 0.196\n")
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
     return "room.yaml"
 
+
 Where = Callable[[Array], Pose]
-# Rays of some scans: scans by beams all, but t (scans) and beam (beams).
-Rays = NamedTuple("Rays", [
-    ("t", Array), ("beam", Ints), ("r", Array), ("hit", Ints), ("cosi", Array), ("ox", Array),
-    ("oy", Array), ("a", Array), ("dark", Array), ("yaw_rate", Array)])
-# How readings scatter: sd of each, what a scan shares and its memory, tails; outliers between lo and hi.
-Scatter = NamedTuple("Scatter", [
-    ("sd", Array), ("shared", float), ("memory", float), ("rho", float), ("inv_nu", float), ("pi", Array),
-    ("lo", Array), ("hi", Array), ("step", float)])
+
+
+class Rays(NamedTuple):
+    """Rays of some scans: all are scans by beams, but t (scans) and beam (beams)."""
+
+    t: Array
+    beam: Ints
+    r: Array
+    hit: Ints
+    cosi: Array
+    ox: Array
+    oy: Array
+    a: Array
+    dark: Array
+    yaw_rate: Array
+
+
+class Scatter(NamedTuple):
+    """How readings scatter: sd of each, outliers between lo and hi, what a scan shares and its memory, tails."""
+
+    sd: Array
+    pi: Array
+    lo: Array
+    hi: Array
+    shared: float
+    memory: float
+    rho: float
+    inv_nu: float
+    step: float
+
 
 def trace(room: Room, las: Laser, fx: Effects, where: Where, t: Array, beam: Ints, t0: float) -> Rays:
     """Follow the rays; `where` is where base_link is."""
     late = fx.p("laser.latency", "delay") + fx.p("laser.clock_skew", "skew") * (
-        (t - t0) ** 2 / 60 if fx.alt("laser.clock_skew") else t - t0)
+        (t - t0) ** 2 / 60 if fx.alt("laser.clock_skew") else t - t0
+    )
     tb = (t - late)[:, None] + las.tinc * (1 + fx.p("laser.sweep", "stretch")) * beam
     x, y, th = where(tb)
     mx, my = las.x + fx.p("laser.mount_x", "x"), las.y + fx.p("laser.mount_y", "y")
@@ -121,6 +162,7 @@ def trace(room: Room, las: Laser, fx: Effects, where: Where, t: Array, beam: Int
     r, hit, cosi = r.reshape(a.shape), hit.reshape(a.shape), cosi.reshape(a.shape)
     dark = np.asarray(1.0 - np.tile(room.boxes[:, 5], 4)[hit], np.float64)
     return Rays(t, beam, r, hit, cosi, ox, oy, a, dark, (where(tb + 0.02)[2] - th) / 0.02)
+
 
 def mean(las: Laser, fx: Effects, q: Rays, d: Drive) -> Array:
     """The mean of each reading, before rounding and gate."""
@@ -143,17 +185,22 @@ def mean(las: Laser, fx: Effects, q: Rays, d: Drive) -> Array:
     own = np.random.default_rng(7).normal(size=las.beams)[q.beam] * p("laser.beam_bias", "sd")
     m = m + own + p("laser.beam_bias", "amplitude") * np.sin(phi + p("laser.beam_bias", "phase"))
     odd, far = fx.odd("laser.range"), p("laser.saturation", "inverse_far")
-    if odd: m = m + curve(_series(odd.covariate, q, d), odd.p)
-    if far > 0: m = m / (1 + (m * far) ** 12) ** (1 / 12) if alt("laser.saturation") else np.minimum(m, 1 / far)
+    if odd:
+        m = m + curve(_series(odd.covariate, q, d), odd.p)
+    if far > 0:
+        m = m / (1 + (m * far) ** 12) ** (1 / 12) if alt("laser.saturation") else np.minimum(m, 1 / far)
     return np.asarray(m)
+
 
 def _series(name: str, q: Rays, d: Drive) -> Array:
     if name in ("hit_x", "hit_y"):
         end = q.ox + q.r * np.cos(q.a) if name == "hit_x" else q.oy + q.r * np.sin(q.a)
         return np.asarray(np.where(np.isfinite(end), end, 0.0))
-    if name == "w": return q.yaw_rate
+    if name == "w":
+        return q.yaw_rate
     u = q.t - d.t[0] if name == "time" else np.interp(q.t, d.t, d.cov[name])
     return np.asarray(np.repeat(u[:, None], len(q.beam), 1))
+
 
 def scatter(las: Laser, fx: Effects, q: Rays, m: Array, d: Drive, burst: Array | None = None) -> Scatter:
     """The scatter of the readings of mean m; `burst` is where, or how probably, another laser shines in."""
@@ -161,7 +208,8 @@ def scatter(las: Laser, fx: Effects, q: Rays, m: Array, d: Drive, burst: Array |
     sd = np.maximum(np.polyval(las.sigma[::-1], np.minimum(q.r, 60.0)), 1e-4) * (1 + p("laser.range_noise", "share"))
     sd = sd * (1 + p("laser.incidence_noise", "gain") * (1 / np.maximum(q.cosi, 0.1) - 1))
     sd = sd * (1 + p("laser.reflectance", "noise") * q.dark)
-    if odd: sd = sd * (1 + np.abs(curve(_series(odd.covariate, q, d), odd.p)))
+    if odd:
+        sd = sd * (1 + np.abs(curve(_series(odd.covariate, q, d), odd.p)))
     pi, lo, hi = np.full_like(sd, 5e-4), np.full_like(sd, las.rmin), np.full_like(sd, las.rmax)
     if fx.get("laser.heavy_tails"):
         pi, reach = np.maximum(pi, p("laser.heavy_tails", "outliers")), p("laser.heavy_tails", "reach", 0.1)
@@ -175,42 +223,51 @@ def scatter(las: Laser, fx: Effects, q: Rays, m: Array, d: Drive, burst: Array |
     if e:
         share = e.p["probability"] * e.p["width"] / (2 * np.pi) if burst is None else burst
         pi, hi = np.where(share > 0, 0.5 * share, pi), np.where(share > 0, min(e.p["reach"], las.rmax), hi)
-    return Scatter(np.sqrt(sd**2 + las.res**2 / 12), p("laser.common_mode", "sd"), p("laser.common_mode", "rho"),
-                   p("laser.beam_correlation", "rho"), p("laser.heavy_tails", "inverse_nu"), pi, lo, hi,
-                   p("laser.quantisation", "step"))
+    rest = "common_mode sd, common_mode rho, beam_correlation rho, heavy_tails inverse_nu, quantisation step"
+    numbers = (p(f"laser.{id_}", name) for id_, name in (key.split() for key in rest.split(", ")))
+    return Scatter(np.sqrt(sd**2 + las.res**2 / 12), pi, lo, hi, *numbers)
+
 
 def bursts(rng: Rng, las: Laser, fx: Effects, t: Array) -> Array:
     """Where another laser's light falls in: a sector that drifts, in some scans."""
     e, on = fx.get("laser.crosstalk"), np.zeros((len(t), 1))
-    if not e: return on
-    for k in range(1, len(t)): on[k] = on[k - 1] if rng.random() < 0.7 else float(rng.random() < e.p["probability"])
+    if not e:
+        return on
+    for k in range(1, len(t)):
+        on[k] = on[k - 1] if rng.random() < 0.7 else float(rng.random() < e.p["probability"])
     phi = las.amin + las.ainc * np.arange(las.beams) - rng.uniform(-1, 1) - e.p["drift"] * (t - t[0])[:, None]
     return np.asarray(on * (np.abs((phi + np.pi) % (2 * np.pi) - np.pi) < e.p["width"] / 2))
+
 
 def draw(rng: Rng, las: Laser, fx: Effects, q: Rays, m: Array, s: Scatter) -> Array:
     """Readings: noise, outliers, gate, rounding, beams without a reading."""
     e, shared = rng.normal(size=m.shape), rng.normal(size=len(m)) * np.sqrt(1 - s.memory**2)
     e[:, 1:] *= np.sqrt(1 - s.rho**2)
     e = lfilter([1.0], [1.0, -s.rho], e, axis=1)
-    if s.inv_nu > 0: e = e / np.sqrt(rng.chisquare(1 / s.inv_nu, m.shape) * s.inv_nu)
+    if s.inv_nu > 0:
+        e = e / np.sqrt(rng.chisquare(1 / s.inv_nu, m.shape) * s.inv_nu)
     shared = lfilter([1.0], [1.0, -s.memory], shared) * s.shared
     z = m + np.sqrt(s.sd**2 - las.res**2 / 12) * e + shared[:, None]
     z = np.where(rng.random(m.shape) < s.pi, s.lo + (s.hi - s.lo) * rng.random(m.shape), z)
     res = max(s.step, las.res)
-    if res > 0: z = res * (np.floor(z / res) if fx.alt("laser.quantisation") else np.round(z / res))
+    if res > 0:
+        z = res * (np.floor(z / res) if fx.alt("laser.quantisation") else np.round(z / res))
     z = np.where((z > las.rmax) | ~np.isfinite(q.r), np.inf, np.where(z < las.rmin, np.nan, z))
     return np.asarray(np.where(rng.random(m.shape) < lost(las, fx, q), np.nan, z))
+
 
 def lost(las: Laser, fx: Effects, q: Rays) -> Array:
     """The probability that a beam has no valid reading."""
     far = fx.p("laser.dropout", "per_metre") * np.minimum(q.r, las.rmax)
     return np.asarray(np.clip(0.002 + fx.p("laser.dropout", "probability") + far, 0, 0.9))
 
+
 def density(s: Scatter, m: Array, z: Array, res: float) -> Array:
     """Log density of each reading, beams taken as independent."""
     e = (z - m) / s.sd
     near = student.pdf(e, 1 / s.inv_nu) / s.sd if s.inv_nu > 0 else np.exp(-0.5 * e * e) / s.sd / np.sqrt(2 * np.pi)
-    if s.step > 0: near = (ndtr(e + s.step / 2 / s.sd) - ndtr(e - s.step / 2 / s.sd)) / max(res, 1e-3)
+    if s.step > 0:
+        near = (ndtr(e + s.step / 2 / s.sd) - ndtr(e - s.step / 2 / s.sd)) / max(res, 1e-3)
     inside = (z >= s.lo - 3 * s.sd) & (z <= s.hi + 3 * s.sd)
     far = np.where(inside, s.pi / (s.hi - s.lo + 6 * s.sd), 1e-9)
     return np.asarray(np.log(np.maximum(near, 1e-30) * (1 - s.pi) + far))
