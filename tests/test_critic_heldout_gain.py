@@ -345,6 +345,16 @@ def test_a_curve_that_scans_held_out_refuse_gives_way_to_another_or_is_amber(nat
     assert ("do not say by what: nearest is smooth.scatter.time" in verdict.story.headline) == (told == ["unresolved"])
 
 
+@pytest.mark.parametrize(("nats", "told"), [(1e3, ["unresolved"]), (30.0, [])])
+def test_what_makes_readings_scatter_for_sure_is_amber_where_scans_held_out_refuse_every_name(nats, told):
+    setting = EffectSetting("laser.crosstalk", {})
+    finding = LaserFinding((Cause(setting.id, 1.0, {}, nats),), settings=(setting,))
+    worse = ChannelGain(LogDensityGain(0.0, -0.1, -0.1, -0.11, -0.09))
+    left, gained = confirmed_scans(finding, lambda _: worse)
+    assert (left.causes, gained) == ((), None)
+    assert [one.covariate for one in left.unknown] == told
+
+
 def test_what_is_right_stays_where_scans_held_out_refuse_another(tmp_path):
     data = scanned(tmp_path, "laser.scale", 0.01, 1, scans=12)
     data = replace(data, test=data.train)

@@ -8,10 +8,12 @@ import pytest
 
 from kurumaisu.critic.judge.reference_faults import from_base_link, ruled_out, without_double_delay
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
+from kurumaisu.critic.ranges.search.block_evidence import compare_blocks
 from kurumaisu.critic.ranges.search.confounding import confounded
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form, grid_of
+from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.values.criticism import LaserFinding
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.critic.values.verdict import Cause, Estimate
@@ -39,6 +41,22 @@ def test_many_walls_do_not_imitate_an_effect_by_chance(walls, a_set):
     assert found.best.ids == {"an.effect"}
     groups = confounded(found, None, [free], gram, ["an.effect"])
     assert groups == ((("a.map", "an.effect"),) if a_set else ())
+
+
+def test_a_curve_that_is_a_level_draws_an_offset_not_a_warm_up_that_has_hardly_begun():
+    readings = 300
+    times = np.linspace(0.0, 150.0, readings)
+    knots = np.linspace(0.0, 150.0, 5)
+    basis = Basis("time", knots, {}, (np.eye(5),), 0.0, 150.0)
+    level = np.ones(readings)
+    y = 3.0 * level + np.random.default_rng(3).standard_normal(readings)
+    gram = np.column_stack([level, np.exp(-times / 2500.0), basis.matrix(times), y])
+    ids = ("laser.offset", "laser.warmup")
+    forms = [Form(name, {}, (Column(SIZE, squared=False, beside={}),), i) for i, name in enumerate(ids)]
+    free = Block("smooth.range.time", None, basis, (np.eye(5),), slice(2, 7))
+    gram = gram.T @ gram
+    rivals = compare_blocks(FormSearch(forms, gram).run(), [free], gram, {}).rivals
+    assert {rival.form_of for rival in rivals if not rival.fit.forms} == {"laser.offset"}
 
 
 def test_a_time_that_a_short_drive_does_not_see_is_tried():

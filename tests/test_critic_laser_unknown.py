@@ -96,6 +96,15 @@ def test_beside_what_is_in_no_catalogue_nothing_is_told_of_scatter_but_what_is_l
     assert {cause.id for cause in finding.causes} == {"laser.dropout"}
 
 
+@pytest.mark.parametrize("step", [0.0069, 0.0103])
+def test_the_step_of_a_coarse_grid_is_known_to_a_thousandth(tmp_path, step):
+    """Whose values are rounded to millimetres, and of which some are read by none of few beams."""
+    data = sparse(recording(tmp_path, "laser.quantisation", step, 5, scans=40))
+    (cause,) = criticise_scans(data, MODEL, say).causes
+    assert cause.id == "laser.quantisation"
+    assert cause.parameters["step"].estimate == pytest.approx(step, rel=2e-3)
+
+
 def added(setting, ranges):
     """What an effect adds to the mean of one reading [m]."""
     chain = effects.build_laser((setting,), np.random.default_rng(0))
