@@ -68,6 +68,12 @@ class ScatterPiece:
     free: tuple[str, ...]
     nats: float = 0.0
 
+    def start(self, low: float) -> RoughFit:
+        """Return it as what to fit beside others, with the misfit then."""
+        values = self.setting.parameters
+        form = {name: value for name, value in values.items() if name not in self.free}
+        return RoughFit(low, self.effect, form, {name: values[name] for name in self.free})
+
     @property
     def price(self) -> float:
         """What its parameters but the first cost [nat]."""

@@ -141,12 +141,18 @@ class ScatterSearch:
             yield self._weighed(group, cost)
 
     def _starts(self, pushes: Sequence[StatisticsChange], known: _Fitted) -> Iterator[RoughFit]:
-        """Yield rough sizes of each other effect beside a set."""
-        at = self._fit.statistics(known.settings, (1, 2))
+        """Yield rough sizes of each other effect beside a set, or those that it was fitted with in another one."""
+        at, plain = (self._fit.statistics(settings, (1, 2)) for settings in (known.settings, ()))
         for effect in self._fit.candidates(set(known.effects)):
-            own = [push for push in pushes if push.effect is effect]
-            if own:
-                yield self._fit.rough(own, at)
+            found = []
+            if own := [push for push in pushes if push.effect is effect]:
+                found.append(self._fit.rough(own, at))
+            fitted = max((one for one in self._known.values() if effect in one.effects), key=_score, default=None)
+            for piece in fitted.pieces if fitted is not None else ():
+                if piece.effect is effect:
+                    change = self._fit.statistics((piece.setting,), (1, 2)) - plain
+                    found.append(piece.start(self._likeness.cost(at + change)))
+            yield from sorted(found, key=attrgetter("low"))[:1]
 
     def _weighed(self, pieces: Sequence[ScatterPiece], cost: float) -> _Fitted:
         """Return a fitted set with its evidence beside that of none; cost: its misfit [nat]."""

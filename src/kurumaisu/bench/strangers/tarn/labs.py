@@ -143,7 +143,7 @@ def model_text(lab: Lab) -> str:
   time_increment: {q.tinc:.8f}
     scale: {q.scale}
     datum_offset: {q.offset}
-    sigma: [{', '.join(f'{one:.7f}' for one in q.sigma)}]
+    sigma: [{", ".join(f"{one:.7f}" for one in q.sigma)}]
     resolution: {q.res}
     range_min: {q.rmin}
     range_max: {q.rmax}"""
