@@ -318,6 +318,6 @@ def test_a_curve_that_draws_an_effect_is_that_effect_in_another_form(tmp_path, m
     monkeypatch.setattr(laser_scene, "mean_reading", by_the_square)
     data = recording(tmp_path, "laser.incidence_bias", 0.01, 9, scans=30)
     assert [cause.id for cause in criticise_scans(data, MODEL, say).causes] == ["laser.incidence_bias"]
-    for limit in ("_ALIKE", "_ALIKE_OVER"):
+    for limit in ("ALIKE", "_ALIKE_OVER"):
         monkeypatch.setattr(block_evidence, limit, 2.0)  # no curve draws any
     assert criticise_scans(data, MODEL, say).unknown[0].covariate == "incidence"

@@ -13,7 +13,7 @@ from kurumaisu.types import FloatArray
 
 _BACK = 5.0  # [s] within which a reference that was elsewhere is back
 _SAME = 0.5  # share of its first jump that is left when it is back
-_NEAR = 2  # rows
+NEAR = 2  # rows
 _GAP = 5.0  # usual intervals
 
 Spans = list[tuple[int, int, float]]  # first row, end and distance [m] of each stretch that is off
@@ -79,7 +79,7 @@ def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, in
     gaps = [0, *(np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist(), len(pose.t)]
     for i in jumped:
         far = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
-        yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= _NEAR)
+        yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= NEAR)
 
 
 def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:

@@ -16,7 +16,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.sanity import imu_match
 from kurumaisu.critic.sanity.contacts import TOPIC, contacts
-from kurumaisu.critic.sanity.displaced_rows import Spans, displaced_rows
+from kurumaisu.critic.sanity.displaced_rows import NEAR, Spans, displaced_rows
 from kurumaisu.critic.sanity.rows import stale
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
@@ -30,7 +30,6 @@ _FAR = 8.0  # sds of what a model leaves between two rows
 _LONGEST = 1.0  # [s]
 _RETURN = 0.4  # share of the way out, of which the way back may differ
 _QUIET = 0.35  # the same, that another row near by may be off
-_NEAR = 2  # rows
 # Of a normal vector's components, by the number of them, over the median of its norm.
 _SD = {1: SIGMA_PER_MAD, 2: 0.8493}
 
@@ -140,7 +139,7 @@ def _excursions(left: FloatArray, times: FloatArray) -> list[tuple[int, int]]:
     found = []
     loud = np.flatnonzero(size > max(limit, 1e-6))
     for i, j in pairwise(loud):
-        between = np.r_[max(i - _NEAR, 0) : i, i + 1 : j, j + 1 : min(j + _NEAR + 1, len(size))]
+        between = np.r_[max(i - NEAR, 0) : i, i + 1 : j, j + 1 : min(j + NEAR + 1, len(size))]
         back = np.linalg.norm(left[i] + left[i + 1 : j + 1].sum(axis=0)) < _RETURN * size[i]
         if back and times[j + 1] - times[i] < _LONGEST and (size[between] < _QUIET * size[i]).all():
             found.append((int(i) + 1, int(j) + 1))

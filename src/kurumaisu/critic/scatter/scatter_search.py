@@ -143,16 +143,17 @@ class ScatterSearch:
     def _starts(self, pushes: Sequence[StatisticsChange], known: _Fitted) -> Iterator[RoughFit]:
         """Yield rough sizes of each other effect beside a set, or those that it was fitted with in another one."""
         at, plain = (self._fit.statistics(settings, (1, 2)) for settings in (known.settings, ()))
+        ranked = sorted(self._known.values(), key=_score)
+        fitted = {piece.effect: piece for one in ranked for piece in one.pieces}  # as in the likeliest set
         for effect in self._fit.candidates(set(known.effects)):
             found = []
             if own := [push for push in pushes if push.effect is effect]:
                 found.append(self._fit.rough(own, at))
-            fitted = max((one for one in self._known.values() if effect in one.effects), key=_score, default=None)
-            for piece in fitted.pieces if fitted is not None else ():
-                if piece.effect is effect:
-                    change = self._fit.statistics((piece.setting,), (1, 2)) - plain
-                    found.append(piece.start(self._likeness.cost(at + change)))
-            yield from sorted(found, key=attrgetter("low"))[:1]
+            if piece := fitted.get(effect):
+                change = self._fit.statistics((piece.setting,), (1, 2)) - plain
+                found.append(piece.start(self._likeness.cost(at + change)))
+            if found:
+                yield min(found, key=attrgetter("low"))
 
     def _weighed(self, pieces: Sequence[ScatterPiece], cost: float) -> _Fitted:
         """Return a fitted set with its evidence beside that of none; cost: its misfit [nat]."""

@@ -17,7 +17,7 @@ from kurumaisu.critic.engine.covariance import orthonormal, without
 from kurumaisu.critic.engine.evidence import Beside, Fit, Problem
 from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.unknown.bases import root_of
-from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, Design, curve_evidences
+from kurumaisu.critic.unknown.curves import ALIKE, AS_ALIKE, Curve, CurveEvidence, Design, curve_evidences
 from kurumaisu.critic.unknown.curves import columns as columns_of
 from kurumaisu.critic.unknown.step_curves import fine_curves, gains_over_own_rate, step_curves
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS
@@ -26,8 +26,6 @@ from kurumaisu.types import FloatArray
 _DRAWN = 0.8  # share of a signal's square that a curve can draw, from which it is one
 _HINTS = 3  # curves in whose place others are tried: most of a jump shows in a curve that cannot jump
 _BENDING = _JUMPING = 0.2  # share of what is outside the catalogue that bends more often, or jumps
-_ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
-_AS_ALIKE = 0.01  # by which the correlation with another one's may be less, and nobody knows which of both it draws
 _NO_LEVEL = 0.05  # share of a signal's square beyond a level, below which it is one
 _SAME = 0.1  # share of the rates by which they may differ and be nearly the same
 _WORTH = -2.0  # [nat] below which a curve is not kept
@@ -155,8 +153,8 @@ class CurveSearch:
         single = [each for each in alike if len(each[0]) == 1]
         best = max(single, key=lambda each: each[1], default=(frozenset(), 0.0))
         several = [each for each in alike if len(each[0]) > 1]
-        found = next((ids for ids, share in (best, *several) if share >= _ALIKE), frozenset())
-        close = (ids for ids, share in single if len(found) == 1 and share >= best[1] - _AS_ALIKE)
+        found = next((ids for ids, share in (best, *several) if share >= ALIKE), frozenset())
+        close = (ids for ids, share in single if len(found) == 1 and share >= best[1] - AS_ALIKE)
         return replace(one, form_of=found, likewise=frozenset[str]().union(*close) - found)
 
     def _signals(self, fit: Fit, names: frozenset[str]) -> FloatArray:

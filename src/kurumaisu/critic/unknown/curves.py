@@ -37,7 +37,8 @@ _BRAKES = {
     "speed": ("time", "heading", "x", "y"),
 }
 
-
+ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
+AS_ALIKE = 0.01  # by which the correlation with another one's may be less, and nobody knows which of both it draws
 # What the errors of a reference may follow: of the place above all, as markers go out of sight and maps are bent. What
 # it does over the time is the noise's, which may be slow.
 _SEEN_OVER = {

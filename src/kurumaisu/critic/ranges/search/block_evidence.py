@@ -16,7 +16,7 @@ from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, F
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
 from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
 from kurumaisu.critic.unknown.bases import root_of
-from kurumaisu.critic.unknown.curves import CurveEvidence, curve_evidence
+from kurumaisu.critic.unknown.curves import ALIKE, AS_ALIKE, CurveEvidence, curve_evidence
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS, odds
 from kurumaisu.types import FloatArray, IntArray
 
@@ -28,9 +28,7 @@ _SINGLES = 12  # best single effects likewise
 _PRUNED = 3  # best sets with a block that are pruned
 _FARTHEST = 3.0  # sds of a block's coefficients, beyond which hardly one lies
 _NEAR = 30.0  # [nat] behind the likeliest, beyond which nobody asks what a curve draws
-_ALIKE = 0.9  # correlation with an effect's signal from which a curve draws that effect
-_AS_ALIKE = 0.01  # by which the correlation with another one's may be less, and nobody knows which of both it draws
-_ALIKE_OVER = float(np.sqrt(0.5))  # the same where both follow the same: half of what it does
+_ALIKE_OVER = float(np.sqrt(0.5))  # as ALIKE, where both follow the same: half of what it does
 _SIZES = np.geomspace(1e-3, 1e2, 400)  # of the sd of a block's coefficients, in units of its scale
 
 Families = Mapping[str, tuple[slice, FormFamily]]  # by effect: what its equation may miss, and where its columns are
@@ -278,14 +276,14 @@ def _form_of(rival: SetWithBlock, singles: Sequence[FittedForms], gram: FloatArr
         inner = without_span(gram, both, _use(rival.fit))[0]
         pair = block_diag(drawn[:, np.newaxis], fit.coefficients[:, np.newaxis])
         (one, across), (_, other) = pair.T @ inner @ pair
-        least = _ALIKE_OVER if follows == rival.free.basis.covariate else _ALIKE
-        least = least if effects.by_id(form.id).empirical else 1 - _AS_ALIKE  # it has no other form
+        least = _ALIKE_OVER if follows == rival.free.basis.covariate else ALIKE
+        least = least if effects.by_id(form.id).empirical else 1 - AS_ALIKE  # it has no other form
         share = float(across / np.sqrt(one * other)) if min(one, other) > 0 else 0.0
         if share >= least:
             alike.append((share, fit.score, form.id))
     nearest = max(alike, default=(0.0, 0.0, ""))[0]
     # Of two that a curve draws alike the likelier one: most of an offset is a warm-up over a long time, too.
-    return max(((score, name) for share, score, name in alike if share >= nearest - _AS_ALIKE), default=(0.0, None))[1]
+    return max(((score, name) for share, score, name in alike if share >= nearest - AS_ALIKE), default=(0.0, None))[1]
 
 
 def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:
@@ -294,7 +292,7 @@ def _grown(rival: SetWithBlock, gram: FloatArray) -> str | None:
     for form, size in rival.fit.parts():
         across = float(gram[rival.free.span, form.span].sum(axis=0) @ size)
         own = float(size @ gram[form.span, form.span] @ size)
-        if abs(across) >= _ALIKE * np.sqrt(one * own):
+        if abs(across) >= ALIKE * np.sqrt(one * own):
             return form.id
     return None
 
