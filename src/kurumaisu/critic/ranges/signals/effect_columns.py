@@ -18,7 +18,7 @@ from kurumaisu import effects
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots, acts_on_readings, hits_of, predict, thin
 from kurumaisu.effects import Mechanism, Parameter
 from kurumaisu.params import EffectSetting
-from kurumaisu.types import FloatArray, IntArray
+from kurumaisu.types import BoolArray, FloatArray, IntArray
 
 STEP = 0.2  # of a finite difference, in units of a parameter's scale
 _NOTHING = 1e-9  # [m] a change that is none
@@ -193,7 +193,7 @@ class EffectColumns:
             down = self._moved(effect, parameter, -1.0, 0) if parameter.lower < parameter.null else -up
             if _largest(up) < _NOTHING:
                 shaping.append(parameter)
-            elif _rms(up + down) > _rms(up - down):
+            elif _typical(up + down, either := (up != 0) | (down != 0)) > _typical(up - down, either):
                 squares.append(parameter)
             else:
                 acting.append(parameter)
@@ -294,6 +294,12 @@ def _largest(values: FloatArray) -> float:
 
 def _rms(values: FloatArray) -> float:
     return float(np.sqrt(np.nansum(values**2) / max(np.count_nonzero(~np.isnan(values)), 1)))
+
+
+def _typical(values: FloatArray, where: BoolArray) -> float:
+    """Return the middle size of what is known, of some: a beam that passes an edge is off by metres, either way."""
+    known = np.abs(values[where & ~np.isnan(values)])
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def directions(count: int) -> list[tuple[float, ...]]:
