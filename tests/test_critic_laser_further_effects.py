@@ -27,8 +27,8 @@ def with_readings(data, of):
     return replace(data, runs=(replace(run, scan=replace(run.scan, values=values)),))
 
 
-def named(data):
-    found = criticise_scans(data, MODEL, lambda _: None, MEAN)
+def named(data, ids=MEAN):
+    found = criticise_scans(data, MODEL, lambda _: None, ids)
     assert (found.confounded, found.unknown) == ((), ())
     return {cause.id: cause for cause in found.causes}
 
@@ -41,6 +41,14 @@ def test_a_loud_effect_hides_none_that_follows_something_else(tmp_path, late):
     assert set(found) == ({"laser.scale", "laser.latency"} if late else {"laser.scale"})
     if late:
         assert found["laser.latency"].parameters["delay"].estimate == pytest.approx(late, abs=0.002)
+
+
+@pytest.mark.parametrize("power", [1.5, 2.5])
+def test_another_power_of_the_range_is_one_cause(tmp_path, power):
+    """An equation misses more of it than anybody said beforehand, and a scale draws that well."""
+    data = recording(tmp_path, None, 0.0, 5, scans=SCANS)
+    ids = MEAN | {"laser.quadratic", "laser.cyclic"}
+    assert len(named(with_readings(data, lambda r: r + 0.02 * (r / 3) ** power), ids)) == 1
 
 
 def test_a_loud_delay_is_no_mounting(tmp_path):

@@ -25,7 +25,6 @@ from kurumaisu.critic.ranges.noise.shared_errors import (
 )
 from kurumaisu.critic.ranges.poses.pose_corrections import PoseEvidence, likeliest_path, motion_evidence
 from kurumaisu.critic.ranges.scans.gathering import stands_averaged
-from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.sanity import pose_jumps
 from kurumaisu.critic.values.recording import Series
 from kurumaisu.effects import LAGS, Echoes
@@ -318,6 +317,3 @@ def test_a_curve_that_draws_an_effect_is_that_effect_in_another_form(tmp_path, m
     monkeypatch.setattr(laser_scene, "mean_reading", by_the_square)
     data = recording(tmp_path, "laser.incidence_bias", 0.01, 9, scans=30)
     assert [cause.id for cause in criticise_scans(data, MODEL, say).causes] == ["laser.incidence_bias"]
-    for limit in ("ALIKE", "_ALIKE_OVER"):
-        monkeypatch.setattr(block_evidence, limit, 2.0)  # no curve draws any
-    assert criticise_scans(data, MODEL, say).unknown[0].covariate == "incidence"

@@ -14,7 +14,7 @@ from kurumaisu import effects
 from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, integrated_out
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, Shares, integrated_out, over_shares
 from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import ALIKE, AS_ALIKE, CurveEvidence, curve_evidence
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS, odds
@@ -185,16 +185,11 @@ class _Doubted:
         use = np.concatenate([_use(fit), free, [len(self._gram) - 1]])
         some, own = self._gram[np.ix_(use, use)], np.arange(len(use) - 1 - len(free), len(use) - 1)
 
-        def prior(shares: tuple[float, float]) -> FloatArray:
+        def prior(shares: Shares) -> FloatArray:
             each = (family.scaled(self._gram[span, span], power, *shares) for span, family, power in drawn)
             return np.asarray(block_diag(*each))
 
-        nats: dict[tuple[float, float], float] = {(0.0, 0.0): _marginal(some, own, prior((0.0, 0.0)))}
-        for i in range(2):  # one after the other: of all pairs of shares, these hold nearly all that is likely
-            best = max(nats, key=lambda shares: nats[shares])
-            for share in SHARES:
-                shares = (share, best[1]) if i == 0 else (best[0], share)
-                nats[shares] = _marginal(some, own, prior(shares))
+        nats = over_shares(lambda shares: _marginal(some, own, prior(shares)))
         best = max(nats, key=lambda shares: nats[shares])
         more = float(logsumexp(list(nats.values()))) - nats[0.0, 0.0] - 2 * float(np.log(1 + len(SHARES)))
         made = self._gram if best == (0.0, 0.0) else integrated_out(self._gram, free, prior(best))

@@ -95,7 +95,7 @@ class FormSearch:
             ranked = sorted((s for s, fit in self._known.items() if fit is not None), key=lambda s: -self._score(s))
             frontier = ranked[:_WIDTH]
             if self._score(ranked[0]) <= best:
-                return self._found([self._known[s] for s in ranked])
+                return posterior_of([fit for s in ranked if (fit := self._known[s]) is not None], self._ids)
             best = self._score(ranked[0])
 
     def _near(self, chosen: frozenset[int]) -> Iterable[frozenset[int]]:
@@ -160,12 +160,30 @@ class FormSearch:
         cost += LINE_ERROR * (len(forms) - 1) * likelihood
         return FittedForms(forms, at, np.sqrt(np.diag(inverse)), likelihood, likelihood - cost + prior)
 
-    def _found(self, fits: Sequence[FittedForms | None]) -> FormPosterior:
-        known = [fit for fit in fits if fit is not None]
-        scores = np.array([fit.score for fit in known])
-        weights = np.exp(scores - logsumexp(scores))
-        pairs = [(fit.ids, float(weight)) for fit, weight in zip(known, weights, strict=True)]
-        return FormPosterior(tuple(known), *confusion(pairs, known[0].ids, self._ids))
+
+def posterior_of(fits: Iterable[FittedForms], ids: Sequence[str]) -> FormPosterior:
+    """Return how likely each of some effects is by sets of them."""
+    known = sorted(fits, key=lambda fit: -fit.score)
+    scores = np.array([fit.score for fit in known])
+    weights = np.exp(scores - logsumexp(scores))
+    pairs = [(fit.ids, float(weight)) for fit, weight in zip(known, weights, strict=True)]
+    return FormPosterior(tuple(known), *confusion(pairs, known[0].ids, ids))
+
+
+def over_all(found: Sequence[FormPosterior], nats: Sequence[float]) -> FormPosterior:
+    """Return the posterior of sets, whatever else holds; found: where each of some things does, likely by nats."""
+    total = float(logsumexp(nats))
+    every: dict[tuple[int, ...], list[FittedForms]] = {}
+    for one, own in zip(found, nats, strict=True):
+        for fit in one.fits:
+            every.setdefault(tuple(form.start for form in fit.forms), []).append(
+                replace(fit, score=fit.score + own - total)
+            )
+    merged = []
+    for fits in every.values():
+        best = max(fits, key=lambda fit: fit.score)
+        merged.append(replace(best, score=float(logsumexp([fit.score for fit in fits]))))
+    return posterior_of(merged, tuple(found[0].p))
 
 
 def confusion(

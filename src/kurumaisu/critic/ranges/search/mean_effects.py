@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,14 +14,27 @@ from kurumaisu import effects
 from kurumaisu.critic.ranges.search import block_evidence
 from kurumaisu.critic.ranges.search.block_evidence import BEYOND, BlockComparison, Families, SetWithBlock, without_span
 from kurumaisu.critic.ranges.search.confounding import Groups, confounded, merged
-from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, FittedForms, FormPosterior, FormSearch
+from kurumaisu.critic.ranges.search.effect_sets import (
+    LINE_ERROR,
+    FittedForms,
+    FormPosterior,
+    FormSearch,
+    over_all,
+    posterior_of,
+)
 from kurumaisu.critic.ranges.search.large_effect import vanished_effects
 from kurumaisu.critic.ranges.search.misfits import Part
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.search.parameter_fit import ParameterFit, fit_parameters
 from kurumaisu.critic.ranges.signals.coefficient_blocks import pose_curves
 from kurumaisu.critic.ranges.signals.effect_columns import Form
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, form_family, integrated_out
+from kurumaisu.critic.ranges.signals.form_error import (
+    FormFamily,
+    Shares,
+    form_family,
+    integrated_out,
+    over_shares,
+)
 from kurumaisu.critic.unknown.curves import curve_evidence
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS
 from kurumaisu.effects import Mechanism
@@ -59,6 +72,11 @@ class FurtherEffects:
     found: FormPosterior
     groups: Groups
 
+    def without(self, gone: frozenset[str]) -> FurtherEffects:
+        """Return it without what a refit took back, which stands in for nothing either."""
+        left = [fit for fit in self.found.fits if not fit.ids & gone]
+        return replace(self, found=posterior_of(left, [name for name in self.found.p if name not in gone]))
+
 
 def further_effects(
     assembly: Assembly,
@@ -86,14 +104,25 @@ def further_effects(
     # Curves that effects of the fit may follow instead, and what these effects do (k, b) [m].
     parts = [(others[form.id], form, size) for form, size in fit.parts() if form.id in others]
     curves = [(curve, assembly.columns[:, :, form.span] @ size) for curve, form, size in parts]
-    gram = _gram([columns[:, :, form.span] for form in rest], refitted, curves)
     starts = np.cumsum([0, *(len(form.columns) for form in rest)])
     moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
-    seen = FormSearch(moved, gram).run()
+    weighed = _doubted([columns[:, :, form.span] for form in rest], refitted, curves)
+    tried: dict[Shares, FormPosterior] = {}
+
+    def best(shares: Shares) -> float:
+        gram, nats = weighed(shares)
+        tried[shares] = FormSearch(moved, gram).run()
+        likely[shares] = nats
+        return nats + tried[shares].best.score
+
+    # How much an equation misses is as open as what acts.
+    likely: dict[Shares, float] = {}
+    over_shares(best)
+    seen = over_all(list(tried.values()), list(likely.values()))
     if not seen.named and not seen.confounded:
         return None
     names = [*seen.named, *(name for group in seen.confounded for name in group if name in seen.best.ids)]
-    groups = merged(seen.confounded, confounded(seen, None, (), gram, names))
+    groups = merged(seen.confounded, confounded(seen, None, (), np.empty((0, 0)), names))
     back = {form.start: known[_key(form)] for form in moved}
     fits = tuple(replace(one, forms=tuple(back[form.start] for form in one.forms)) for one in seen.fits)
     return FurtherEffects(replace(seen, fits=fits), groups)
@@ -112,27 +141,34 @@ def _promising(found: FormPosterior, fit: FittedForms) -> bool:
     return any(unasked(one) > unasked(fit) for one in found.fits if one.ids > fit.ids)
 
 
-def _gram(
+def _doubted(
     parts: Sequence[NDArray[np.float32]], refitted: ParameterFit, curves: Sequence[tuple[FormFamily, FloatArray]]
-) -> FloatArray:
-    """Return the normal equations of columns (k, b, m) and, last, of what the refitted leave, whatever their sizes."""
+) -> Callable[[Shares], tuple[FloatArray, float]]:
+    """Return what gives the normal equations of columns and, last, of what the refitted leave, whatever their sizes.
+
+    By the shares of what they do that equations may miss; and how likely the data are by these alone [nat].
+    """
     there = refitted.assembly
     left = there.residual - there.marks.together([setting for setting, _ in refitted.settings])
     count = sum(part.shape[2] for part in parts)
     free = [curve.columns(there.shots, there.marks.seen) for curve, _ in curves]
     signals = [change[:, :, np.newaxis] for _, change in curves]
-    every = np.concatenate([*parts, refitted.slopes, *free, *signals], axis=2)
-    gram = there.products(refitted.normal, every, left)
+    gram = there.products(refitted.normal, np.concatenate([*parts, refitted.slopes, *free, *signals], axis=2), left)
     ends = np.cumsum([count, refitted.slopes.shape[2], *(part.shape[2] for part in free)])
-    powers = np.diag(gram)[ends[-1] : -1]
-    priors = [
-        curve.scaled(gram[low:high, low:high], power)
-        for (curve, _), low, high, power in zip(curves, ends[1:-1], ends[2:], powers.tolist(), strict=True)
-    ]
-    drawn = np.arange(count, ends[-1])
-    keep = np.r_[np.arange(count), len(gram) - 1]
-    prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors)
-    return integrated_out(gram, drawn, prior)[np.ix_(keep, keep)]
+    powers = np.diag(gram)[ends[-1] : -1].tolist()
+    drawn, keep = np.arange(count, ends[-1]), np.r_[np.arange(count), len(gram) - 1]
+
+    def weighed(shares: Shares) -> tuple[FloatArray, float]:
+        priors = [
+            curve.scaled(gram[low:high, low:high], power, *shares)
+            for (curve, _), low, high, power in zip(curves, ends[1:-1], ends[2:], powers, strict=True)
+        ]
+        prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors)
+        made = integrated_out(gram, drawn, prior)
+        volume = np.linalg.slogdet(np.eye(len(drawn)) + gram[np.ix_(drawn, drawn)] @ prior)[1]
+        return made[np.ix_(keep, keep)], -0.5 * float(made[-1, -1] + volume)
+
+    return weighed
 
 
 def settings_of(assembly: Assembly, fit: FittedForms) -> list[EffectSetting]:
@@ -279,7 +315,8 @@ def settled(
     while made.winner is None:
         gone = vanished_effects(assembly, made.fit, fit)
         if gone:
-            made = replace(made, fit=made.fit.without(gone))
+            more = None if made.more is None else made.more.without(gone)
+            made = replace(made, fit=made.fit.without(gone), more=more)
         elif made.more is None and (more := further_effects(assembly, normal, made.found, made.fit, fit, made.others)):
             made = made.with_further(assembly, normal, more)
         else:

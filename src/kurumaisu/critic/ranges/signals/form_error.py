@@ -8,12 +8,14 @@ size is what nobody can refuse of a form. No effect is named: what it follows is
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
+from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.ranges.scans.beams import BeamHits, Shots
 from kurumaisu.critic.ranges.signals.coefficient_blocks import echoes_of
 from kurumaisu.critic.unknown.bases import Basis, knots_of, priors_of, root_of
@@ -27,6 +29,8 @@ _HATS = 16  # of a curve, as many as of one that is in no catalogue, and two mor
 _FINE = 64  # knots that draw whatever is a curve at all
 _DRAWN = 0.01  # share of an effect's power that such a curve may leave
 _SAMPLES = 20000  # readings by which curves are judged
+_SAME = 1e-4  # share of a change's power beyond what another size does, below which it is that
+Shares = tuple[float, float]
 _MOST = 12  # reflectances that a map may have, for a step each
 
 
@@ -126,6 +130,20 @@ def beam_family(shots: Shots) -> FormFamily:
     return FormFamily((DrawnCurve("bearing", np.linspace(ends.min(), ends.max(), _HATS), np.eye(_HATS)),))
 
 
+def over_shares(weigh: Callable[[Shares], float]) -> dict[Shares, float]:
+    """Return what weighs shares of a signal that equations may miss, for those that hold nearly all that is likely.
+
+    The share of a curve in the place of the signal first, then that of curves that multiply it.
+    """
+    nats = {(0.0, 0.0): weigh((0.0, 0.0))}
+    for i in range(2):
+        best = max(nats, key=lambda shares: nats[shares])
+        for share in SHARES:
+            shares = (share, best[1]) if i == 0 else (best[0], share)
+            nats[shares] = weigh(shares)
+    return nats
+
+
 def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
     """Return normal equations with some columns' coefficients integrated out, which are normal with a covariance."""
     root = root_of(prior)
@@ -144,9 +162,28 @@ def _over(name: str, values: FloatArray, change: FloatArray) -> DrawnCurve:
     ways = (fine, np.searchsorted(np.sort(values), fine), np.cumsum(np.abs(np.diff(drawn, prepend=drawn[:1]))))
     along = np.sum([(way - way[0]) / max(float(way[-1] - way[0]), 1e-300) for way in ways], axis=0)
     knots = np.interp(np.linspace(0.0, along[-1], _HATS), along, fine)
-    # Rough or smooth along these, with a level of its own or without: nobody knows.
-    every = priors_of(np.arange(_HATS, dtype=float), _hats(knots, values))
-    return DrawnCurve(name, knots, np.mean(list(every), axis=0))
+    hats = _hats(knots, values)
+    # Rough or smooth along these, with a level of its own or without, or of another power or scale: nobody knows.
+    every = [
+        *priors_of(np.arange(_HATS, dtype=float), hats),
+        *_deformations(knots, np.interp(knots, fine, drawn), hats),
+    ]
+    return DrawnCurve(name, knots, np.mean(every, axis=0))
+
+
+def _deformations(knots: FloatArray, heights: FloatArray, hats: FloatArray) -> Iterator[FloatArray]:
+    """Yield covariances of a curve's heights (n,) at knots by which another power of it, and another scale, differs.
+
+    hats (samples, n): each is as large there as a curve of priors_of, without what another size of the curve does.
+    """
+    top = max(float(np.abs(heights).max()), 1e-300)
+    power = heights * np.log(np.maximum(np.abs(heights) / top, 1e-9))
+    for way in (power, knots * np.gradient(heights, knots)):
+        own, other = hats @ heights, hats @ way
+        rest = way - heights * float(own @ other) / max(float(own @ own), 1e-300)
+        size = float(np.mean((hats @ rest) ** 2))
+        if size > _SAME * float(np.mean(other**2)):
+            yield np.outer(rest, rest) / size
 
 
 def _values(name: str, shots: Shots, seen: BeamHits) -> FloatArray:
