@@ -32,11 +32,28 @@ def residual(seed):
 def test_it_is_the_identity_and_the_columns(u, seed):
     dense, r, covariance = np.eye(ROWS) + u @ u.T, residual(seed), Covariance(u)
     assert covariance.log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=1e-3)
-    assert covariance.square(r) == pytest.approx(r @ np.linalg.solve(dense, r), rel=1e-4, abs=1e-3)
-    np.testing.assert_allclose(covariance.columns @ covariance.columns.T, u @ u.T, rtol=1e-6, atol=1e-3)
-    np.testing.assert_allclose(
-        covariance.directions.T @ covariance.directions, np.eye(len(covariance.variances)), atol=1e-3
-    )
+    np.testing.assert_allclose(covariance.inverse(r), np.linalg.solve(dense, r), rtol=1e-4, atol=1e-3)
+    directions = covariance.along(np.eye(ROWS))
+    np.testing.assert_allclose(directions @ directions.T, np.eye(len(directions)), atol=1e-3)
+    np.testing.assert_allclose((directions.T * covariance.variances) @ directions, u @ u.T, rtol=1e-6, atol=1e-3)
+
+
+@given(columns(), st.integers(0, 999))
+def test_single_precision_is_enough_along_the_directions(u, seed):
+    covariance, x = Covariance(u), np.random.default_rng(seed).standard_normal((ROWS, 3))
+    rough = covariance.along(x.astype(np.float32))
+    for one in (covariance.lost, covariance.variances / (1 + covariance.variances) ** 2):
+        np.testing.assert_allclose(
+            (rough.T * one) @ rough, (covariance.along(x).T * one) @ covariance.along(x), atol=1e-3
+        )
+
+
+@given(columns(), columns(), st.floats(0.1, 3.0))
+def test_more_columns_beside_it_are_as_if_they_had_been_there(u, x, share):
+    found = Covariance(u).scaled(share).beside(x)
+    dense = np.eye(ROWS) + share**2 * u @ u.T + x @ x.T
+    np.testing.assert_allclose(found.inverse(np.eye(ROWS)), np.linalg.inv(dense), atol=2e-3)
+    assert found.log_determinant == pytest.approx(np.linalg.slogdet(dense)[1], abs=5e-3)
 
 
 @given(columns(), st.integers(0, 999))

@@ -3,7 +3,10 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
+from numpy.typing import NDArray
 
 from kurumaisu.types import FloatArray
 
@@ -11,19 +14,31 @@ _SEEN = 1e-4  # variance along a direction below which white noise hides it
 
 
 class Covariance:
-    """I + U U' for whitened columns U (rows, k), each of which may be off by a normal share, sd 1."""
+    """I + U U' for whitened columns U (rows, k), each of which may be off by a normal share, sd 1.
 
-    def __init__(self, columns: FloatArray) -> None:
-        values, vectors = np.linalg.eigh(columns.T @ columns)
+    variances (n,): along orthonormal directions, which stay combinations of the columns: they are never written out.
+    """
+
+    def __init__(self, columns: FloatArray, gram: FloatArray | None = None) -> None:
+        """Take columns; gram: their products U'U, where they are known."""
+        self._whole, self._gram = columns, columns.T @ columns if gram is None else gram
+        values, vectors = np.linalg.eigh(self._gram)
         use = values > _SEEN
         self.variances: FloatArray = values[use]
-        self.directions: FloatArray = columns @ (vectors[:, use] / np.sqrt(values[use]))
+        self._turn: FloatArray = vectors[:, use] / np.sqrt(values[use])  # from the columns to the directions
 
     def scaled(self, share: float) -> Covariance:
         """Return I + (share U)(share U)'."""
-        other = object.__new__(Covariance)
-        other.variances, other.directions = share**2 * self.variances, self.directions
+        other = copy(self)
+        other.variances = share**2 * self.variances
         return other
+
+    def beside(self, columns: FloatArray) -> Covariance:
+        """Return what has more columns (rows, k)."""
+        known = self._turn * np.sqrt(self.variances)  # from the columns to those of a rotated U
+        across = known.T @ (self._whole.T @ columns)
+        gram = np.block([[np.diag(self.variances), across], [across.T, columns.T @ columns]])
+        return Covariance(np.column_stack([self._whole @ known, columns]), gram)
 
     @property
     def log_determinant(self) -> float:
@@ -32,28 +47,33 @@ class Covariance:
 
     @property
     def lost(self) -> FloatArray:
-        """Return the share of the square along each direction that speaks for nothing, (k,)."""
+        """Return the share of the square along each direction that speaks for nothing, (n,)."""
         return np.asarray(self.variances / (1 + self.variances))
 
-    @property
-    def columns(self) -> FloatArray:
-        """Return U but for a rotation, (rows, k)."""
-        return np.asarray(self.directions * np.sqrt(self.variances))
+    def along(self, columns: FloatArray | NDArray[np.float32]) -> FloatArray:
+        """Return what columns (rows, k), or a residual (rows,), are along the directions, (n, k) or (n,).
+
+        Of many columns single precision is enough, and takes half as long.
+        """
+        whole = self._whole.astype(np.float32) if columns.dtype == np.float32 else self._whole
+        return np.asarray(self._turn.T @ (whole.T @ columns).astype(np.float64))
 
     def gain(self, left: FloatArray) -> float:
         """Return how much likelier a residual (rows,) is than by white noise alone [nat]."""
-        return 0.5 * float(left @ left - self.square(left) - self.log_determinant)
-
-    def square(self, left: FloatArray) -> float:
-        """Return r' C^-1 r of a residual (rows,)."""
-        along = self.directions.T @ left
-        return float(left @ left - self.lost @ along**2)
+        return 0.5 * float(self.lost @ self.along(left) ** 2 - self.log_determinant)
 
     def whiten(self, columns: FloatArray) -> FloatArray:
         """Return C^-1/2 X of columns (rows, n) or of a residual (rows,)."""
         less = 1 - 1 / np.sqrt(1 + self.variances)
-        along = self.directions.T @ columns
-        return np.asarray(columns - self.directions @ (along.T * less).T)
+        return np.asarray(columns - self._spread((self.along(columns).T * less).T))
+
+    def inverse(self, columns: FloatArray) -> FloatArray:
+        """Return C^-1 X of columns (rows, n) or of a residual (rows,)."""
+        return np.asarray(columns - self._spread((self.along(columns).T * self.lost).T))
+
+    def _spread(self, along: FloatArray) -> FloatArray:
+        """Return in rows what is given along the directions."""
+        return np.asarray(self._whole @ (self._turn @ along))
 
 
 def orthonormal(columns: FloatArray) -> FloatArray:

@@ -250,9 +250,15 @@ class Problem:
 
     def _beside(self, terms: Sequence[Term], solution: least_squares.Solution) -> Beside:
         own = orthonormal(solution.slopes)
-        blocks = {name: Covariance(some) for name, some in form_errors(self, terms, solution.values, own).items()}
-        many = [np.empty((len(own), 0)), *(one.columns for one in blocks.values())]
-        missed = next(iter(blocks.values())) if len(blocks) == 1 else Covariance(np.column_stack(many))
+        columns = form_errors(self, terms, solution.values, own)
+        whole = np.column_stack([np.empty((len(own), 0)), *columns.values()])
+        gram: FloatArray = np.asarray(whole.T @ whole, dtype=np.float64)
+        missed = Covariance(whole, gram)
+        ends = np.cumsum([some.shape[1] for some in columns.values()])
+        blocks = {
+            name: Covariance(some, gram[end - some.shape[1] : end, end - some.shape[1] : end])
+            for (name, some), end in zip(columns.items(), ends, strict=True)
+        }
         left = without(own, solution.residual)
         gains = [missed.scaled(share).gain(left) for share in SHARES]
         best = SHARES[int(np.argmax(gains))]

@@ -28,6 +28,7 @@ _HINTS = 3  # curves in whose place others are tried: most of a jump shows in a 
 _BENDING = _JUMPING = 0.2  # share of what is outside the catalogue that bends more often, or jumps
 _NO_LEVEL = 0.05  # share of a signal's square beyond a level, below which it is one
 _SAME = 0.1  # share of the rates by which they may differ and be nearly the same
+_PRECISION = 1e-6  # of the products with what equations may miss, which are in single precision
 _WORTH = -2.0  # [nat] below which a curve is not kept
 
 
@@ -179,8 +180,8 @@ class CurveSearch:
         """Return the evidence of each curve of a design [nat], and that at its likeliest share."""
         columns = design.columns
         own = beside.own.T @ columns
-        along = beside.missed.directions.T @ columns
-        left = beside.missed.directions.T @ beside.residual
+        along = beside.missed.along(design.single)
+        left = beside.missed.along(beside.residual)
         parts: list[list[float]] = [[] for _ in design.curves]
         kept: list[CurveEvidence] = []
         for eps, weight in shares:
@@ -196,7 +197,7 @@ class CurveSearch:
                 for i in some:
                     here = design.curves[i].columns
                     gram = design.grams[i] - own[:, here].T @ own[:, here] - scaled[:, here].T @ scaled[:, here]
-                    grams.append(gram + 1e-9 * np.diag(np.diag(design.grams[i]) + 1e-12))
+                    grams.append(gram + _PRECISION * np.diag(np.diag(design.grams[i]) + 1e-12))
                     pulls.append(rest[here])
                     priors.append(np.stack(design.curves[i].basis.priors))
                 found |= zip(some, curve_evidences(np.array(grams), np.array(pulls), np.array(priors)), strict=True)

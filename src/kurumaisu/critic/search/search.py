@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kurumaisu.critic.engine.catalogue import Candidate, Key, Term
-from kurumaisu.critic.engine.covariance import Covariance
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
 from kurumaisu.critic.search.curve_search import CurveSearch, nearly_same_rates
 from kurumaisu.critic.search.posterior import SearchResult, posterior
@@ -25,6 +24,7 @@ _ALIKE = 0.9  # correlation of neighbouring sizes' signals, at least
 _HALVED = 3  # times a gap is halved to reach it
 _STRAIGHT = 0.998  # correlation of the least and the largest size's signals from which one stands for all
 _SHARES = (0.1, 10.0)  # of a signal by which its size is mended
+_OWN = 1e-5  # share of a signal's square beyond what is beside a fit, below which nothing is left of it
 _NOTHING = 1e-3  # whitened norm of a signal that is none
 EffectSet = frozenset[Candidate]
 _WIDTH = 3  # sets that are gone on from in a round
@@ -68,6 +68,8 @@ class Dictionary:
         self._problem = problem
         self._here = problem.residual((), np.empty(0))
         self.signals: list[Signals] = [found for c in problem.candidates if (found := self._signals(c)) is not None]
+        whole = [np.empty((len(self._here), 0)), *(each.columns for each in self.signals)]
+        self.single = np.concatenate(whole, axis=1, dtype=np.float32)  # those of all, in their order
 
     def _signals(self, candidate: Candidate) -> Signals | None:
         terms = candidate.terms
@@ -130,21 +132,22 @@ def scan(dictionary: Dictionary, fit: Fit, also: FloatArray | None = None) -> li
     beside = fit.beside
     missed = beside.covariance
     if also is not None:
-        missed = Covariance(np.column_stack([missed.columns, also]))
-    inverse = beside.residual - missed.directions @ (missed.lost * (missed.directions.T @ beside.residual))
+        missed = missed.beside(also)
+    inverse = missed.inverse(beside.residual)
     taken = fit.ids
     guesses: list[Guess] = []
+    every, start = missed.along(dictionary.single), 0
     for signals in dictionary.signals:
+        lost = every[:, start : (start := start + signals.columns.shape[1])]
         if signals.candidate.id in taken:
             continue
         columns = signals.columns
         pull = columns.T @ inverse
         own = beside.own.T @ columns
-        lost = missed.directions.T @ columns
         square = np.sum(columns**2, axis=0) - np.sum(own**2, axis=0) - missed.lost @ lost**2
         pull = pull - own.T @ (beside.own.T @ inverse)
         whole = np.sum(columns**2, axis=0)
-        known = square > 1e-6 * whole
+        known = square > _OWN * whole
         z = np.where(known, pull / np.sqrt(np.maximum(square, 1e-12)), 0.0)
         guesses += _guesses(signals, z, np.where(known, pull / np.maximum(square, 1e-12), 0.0))
     return sorted(guesses, key=lambda guess: -guess.nats)

@@ -88,6 +88,7 @@ class Design:
                 self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
                 at += 1
         self.columns = columns(problem, settings, self.curves)
+        self.single = self.columns.astype(np.float32)
         self.grams = [self.columns[:, c.columns].T @ self.columns[:, c.columns] for c in self.curves]
 
 
