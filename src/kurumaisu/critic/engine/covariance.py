@@ -21,9 +21,9 @@ class Covariance:
 
     def __init__(self, columns: FloatArray, gram: FloatArray | None = None) -> None:
         """Take columns; gram: their products U'U, where they are known."""
-        self._whole, self._gram = columns, columns.T @ columns if gram is None else gram
-        values, vectors = np.linalg.eigh(self._gram)
+        values, vectors = np.linalg.eigh(columns.T @ columns if gram is None else gram)
         use = values > _SEEN
+        self._whole = columns
         self.variances: FloatArray = values[use]
         self._turn: FloatArray = vectors[:, use] / np.sqrt(values[use])  # from the columns to the directions
 

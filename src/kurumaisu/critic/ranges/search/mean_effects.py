@@ -107,18 +107,19 @@ def further_effects(
     starts = np.cumsum([0, *(len(form.columns) for form in rest)])
     moved = [replace(form, start=int(start)) for form, start in zip(rest, starts[:-1], strict=True)]
     weighed = _doubted([columns[:, :, form.span] for form in rest], refitted, curves)
-    tried: dict[Shares, FormPosterior] = {}
+    tried: dict[Shares, tuple[FormPosterior, float]] = {}
 
     def best(shares: Shares) -> float:
         gram, nats = weighed(shares)
-        tried[shares] = FormSearch(moved, gram).run()
-        likely[shares] = nats
-        return nats + tried[shares].best.score
+        tried[shares] = FormSearch(moved, gram).run(), nats
+        return nats + tried[shares][0].best.score
 
     # How much an equation misses is as open as what acts.
-    likely: dict[Shares, float] = {}
-    over_shares(best)
-    seen = over_all(list(tried.values()), list(likely.values()))
+    if curves:
+        over_shares(best)
+    else:
+        best((0.0, 0.0))
+    seen = over_all([found for found, _ in tried.values()], [nats for _, nats in tried.values()])
     if not seen.named and not seen.confounded:
         return None
     names = [*seen.named, *(name for group in seen.confounded for name in group if name in seen.best.ids)]
