@@ -25,7 +25,6 @@ _ALONG = {"range": (0.25, 0.5, 0.75), "incidence": (0.5, 0.75, 0.9)}
 _SURFACES = 4  # groups by the reflectance, at most
 _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
-_NEAR = 0.15  # [rad] to either side within which outliers of a scan are a burst
 _WITHIN = 3.0  # sds of errors (of poses; of readings, too, at an end that is sought) within which one may be cut off
 _KEPT = 4  # fits of all scans, one for each place at which readings are cut off: a few megabytes each
 _CELL = 0.5  # [m] of the map in which errors are averaged
@@ -84,7 +83,6 @@ class Statistics:
         self._layout, self._tau = assembly.layout, noise.lasting_tau
         self._basis, self._size = basis_of(assembly, noise)
         self._moved = assembly.moved
-        self._near = max(round(_NEAR / abs(assembly.shots.laser.angle_increment)), 1)
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
         limit = steepest(seen.level, seen.incidence)[:, :, axes]
         self._moves = np.clip(self._basis, -limit, limit)
@@ -107,7 +105,7 @@ class Statistics:
         size = np.abs(left[inside])
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
-        out += [_share(far & _with_others(far, near)) for near in (1, self._near)]
+        out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
         out += [_log(float(np.mean(common**2))), _correlation(common)]
         beams = np.broadcast_to(np.arange(z.shape[1]), z.shape)
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
@@ -177,10 +175,7 @@ class Statistics:
                 Statistic(f"readings more than {far:g} sd off", count=True, off=True)
                 for far in (3, 4.5, _FAR, ELSEWHERE)
             ),
-            *(
-                Statistic(f"readings more than {_FAR:g} sd off with others {where}", count=True, off=True)
-                for where in ("beside them", "near by")
-            ),
+            Statistic(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
             Statistic("spread of whole scans", count=False, off=True),
             Statistic("correlation of whole scans", count=False, off=True),
             Statistic("spread of the means per beam", count=False, off=True),
@@ -303,14 +298,6 @@ def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
         rows = np.flatnonzero(stand == place)
         out[rows[1:]] &= ~np.logical_or.accumulate(mask[rows[:-1]], axis=0)
     return out
-
-
-def _with_others(hits: BoolArray, near: int) -> BoolArray:
-    """Return where there are other hits (k, b) in the same scan, so many beams to either side at most."""
-    known = np.pad(np.cumsum(hits, axis=1), ((0, 0), (near + 1, near)), mode="edge")
-    known[:, : near + 1] = 0
-    count = hits.shape[1]
-    return np.asarray(known[:, 2 * near + 1 :][:, :count] - known[:, :count] > hits)
 
 
 def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
