@@ -21,6 +21,12 @@ def anywhere(rng, scan):
     return scan.values + np.where(wild, rng.uniform(-1, 1, scan.values.shape), 0.0)
 
 
+def rare(rng, scan):
+    """One reading of two hundred is anything from 0.06 to 4 m, whatever the beam and the scan."""
+    wild = rng.random(scan.values.shape) < 0.005
+    return np.where(wild, rng.uniform(0.06, 4, scan.values.shape), scan.values)
+
+
 def in_bursts(rng, scan):
     """A fifth of the readings of some hundred neighbours, others from scan to scan, are anything from 0.1 to 4 m."""
     beams = np.arange(scan.values.shape[1])
@@ -29,7 +35,10 @@ def in_bursts(rng, scan):
     return np.where(hit, rng.uniform(0.1, 4, scan.values.shape), scan.values)
 
 
-@pytest.mark.parametrize(("spoil", "name"), [(anywhere, "laser.heavy_tails"), (in_bursts, "laser.crosstalk")])
+@pytest.mark.parametrize(
+    ("spoil", "name"),
+    [(anywhere, "laser.heavy_tails"), (rare, "laser.heavy_tails"), (in_bursts, "laser.crosstalk")],
+)
 def test_outliers_anywhere_are_tails_and_bursts_are_crosstalk(tmp_path, spoil, name):
     told, rng = recording(tmp_path, None, 0.0, 6, scans=30), np.random.default_rng(12)
     runs = tuple(replace(run, scan=replace(run.scan, values=np.round(spoil(rng, run.scan), 3))) for run in told.runs)

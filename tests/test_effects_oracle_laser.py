@@ -260,3 +260,14 @@ def test_outliers_are_as_many_and_as_far_as_asked_anywhere_in_the_fan():
     assert stats.kstest(errors[far & (errors > 0)], stats.truncnorm(0.01 / reach, 9, scale=reach).cdf).pvalue > 1e-3
     assert stats.kstest(np.flatnonzero(far) / n, "uniform").pvalue > 1e-3, "no bursts"
     assert stats.kstest(errors[~far] / 0.001, "norm").pvalue > 1e-3, "the rest as it was"
+
+
+def test_outliers_anywhere_are_even_up_to_the_most_that_is_read():
+    n, share = 60_000, 0.05
+    scan = replace(flat(n, 4), farthest=8.0)
+    values = {"inverse_nu": 0.0, "core": 0.0, "outliers": share, "reach": 0.1, "anywhere": 1.0}
+    readings = chain("laser.heavy_tails", 2, **values).read(scan)
+    far = np.abs(readings - 2.0) > 0.01
+    assert far.mean() == pytest.approx(share, abs=SIGMAS * np.sqrt(share / n))
+    assert stats.kstest(readings[far] / 8.0, "uniform").pvalue > 1e-3
+    assert stats.kstest((readings[~far] - 2.0) / 0.001, "norm").pvalue > 1e-3, "the rest as it was"

@@ -16,6 +16,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.scatter.likelihood import StatisticsLikelihood
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
+from kurumaisu.critic.values.policy import Z_LOW
 from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.effects import LaserStage, Mechanism, Parameter
 from kurumaisu.params import EffectSetting
@@ -30,7 +31,8 @@ _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
 _FARTHEST = 3.0  # such a step, in units of the first difference
 _FINER = 0.5  # of one step's difference is the next one's
 _SETTLED = 0.3  # nats that another step must bring
-_FREE = 2.0  # nats that a further parameter must bring
+_FREE = 2.0  # nats that a shape must bring; a further amplitude must show like any other one
+_NONE = 1e-6  # of what a shape is usually
 _PASSES = 2  # over an effect's further parameters: one may help only where another has been found
 _POOR = 15.0  # nats of misfit from which shapes of an effect are tried, too
 # Factor, at 90 %, by which another form of an effect that is empirical may pass for another size: all numbers follow it
@@ -76,8 +78,11 @@ class ScatterPiece:
 
     @property
     def price(self) -> float:
-        """What its parameters but the first cost [nat]."""
-        return _FREE * (len(self.free) - 1)
+        """What its parameters but the first cost [nat]: a shape is usually within a factor e of what it is usually."""
+        free = [p for p in self.effect.parameters if p.name in self.free]
+        asked = [_least(p) for p in free]
+        factors = [max(abs(self.setting.parameters[p.name]) / p.null, _NONE) for p in free if p.null > 0]
+        return float(sum(asked) - max(asked) + 0.5 * np.sum(np.log(factors) ** 2))
 
 
 class ScatterFit:
@@ -198,13 +203,14 @@ class ScatterFit:
         names = dict.fromkeys(push.name for push in pushes)
         changes = {(push.name, push.value): push.change for push in pushes}
         low, best = np.inf, dict[str, float]()
+        asked = {p.name: _least(p) for p in pushes[0].effect.parameters}
         for _, name in product(range(_PASSES), names):
             others = {k: v for k, v in best.items() if k != name}
             known = at + sum(changes[each] for each in others.items())
             tried = [(self.likeness.cost(known + push.change), push.value) for push in pushes if push.name == name]
             misfit, value = min(tried)
             plain = self.likeness.cost(known) if others else np.inf
-            low, best = (misfit, {**others, name: value}) if misfit < plain - _FREE else (plain, others)
+            low, best = (misfit, {**others, name: value}) if misfit < plain - asked[name] else (plain, others)
         return RoughFit(low, pushes[0].effect, pushes[0].form, best)
 
     def alone(self, start: RoughFit, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
@@ -229,9 +235,9 @@ class ScatterFit:
         tried = [EffectSetting(name, {**values, p.name: value}) for value in _sizes(p)]
         misfits = [self.misfit((*beside, each)) for each in tried]
         # A wider burst of fewer readings: neither of both helps alone.
-        setting = tried[int(np.argmin(misfits))] if min(misfits) < low - _FREE else piece.setting
+        setting = tried[int(np.argmin(misfits))] if min(misfits) < low - _least(p) else piece.setting
         (better,), least = self.together([replace(piece, setting=setting, free=(*piece.free, p.name))], beside)
-        return (better, least) if least < low - _FREE else (piece, low)
+        return (better, least) if least < low - _least(p) else (piece, low)
 
     def together(
         self, pieces: Sequence[ScatterPiece], beside: Sequence[EffectSetting]
@@ -313,6 +319,11 @@ def _of_form(piece: ScatterPiece, p: Parameter) -> tuple[float, float]:
     size = abs(piece.setting.parameters[p.name] - p.null) * piece.effect.empirical / NORMAL90
     below = (1 - 1 / _OTHER) * size
     return below, (_OTHER - 1) * size if p.lower >= p.null else below
+
+
+def _least(p: Parameter) -> float:
+    """Return what a further parameter must bring [nat]."""
+    return _FREE if p.null > 0 else 0.5 * Z_LOW**2
 
 
 def _step(p: Parameter, value: float) -> float:

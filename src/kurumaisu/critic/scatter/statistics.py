@@ -27,6 +27,7 @@ _CLIP = 3.0  # deviations beyond which a reading counts as a tail, not as spread
 _FAR = 6.0  # deviations of an outlier
 _WITHIN = 3.0  # sds of errors (of poses; of readings, too, at an end that is sought) within which one may be cut off
 _KEPT = 4  # fits of all scans, one for each place at which readings are cut off: a few megabytes each
+_BURST = 0.15  # [rad] within which outliers that come together are sought
 _CELL = 0.5  # [m] of the map in which errors are averaged
 _PILE = 0.05  # [m] of the place of a pile, counted as one: it is known to a step of the readings, which is a fiftieth
 _PLACES = 3  # numbers, the last ones, that are such places, or the step of a grid
@@ -81,6 +82,7 @@ class Statistics:
         self._groups = _groups(self._trust, seen.ranges, seen.incidence, seen.returns)
         self._cells = _cells(assembly)
         self._layout, self._tau = assembly.layout, noise.lasting_tau
+        self._beside = max(round(_BURST / abs(assembly.shots.laser.angle_increment)), 1)
         self._basis, self._size = basis_of(assembly, noise)
         self._moved = assembly.moved
         axes = np.r_[0, 1 + np.arange(self._basis.shape[2] - 1) % 3]
@@ -106,6 +108,7 @@ class Statistics:
         out += [_share(size > 3), _share(size > 4.5), _share(size > _FAR), _share(size > ELSEWHERE)]
         far = inside & (np.abs(np.nan_to_num(left)) > _FAR)
         out.append(_share((far[:, 1:] & far[:, :-1])[inside[:, 1:]]))
+        out.append(_crowded(far, inside, self._beside))
         out += [_log(float(np.mean(common**2))), _correlation(common)]
         beams = np.broadcast_to(np.arange(z.shape[1]), z.shape)
         out += [_between(z[known], free[known], group[known]) for group in (beams, self._cells)]
@@ -176,6 +179,7 @@ class Statistics:
                 for far in (3, 4.5, _FAR, ELSEWHERE)
             ),
             Statistic(f"neighbours more than {_FAR:g} sd off", count=True, off=True),
+            Statistic(f"more than chance of those within {_BURST:g} rad of others", count=True, off=True),
             Statistic("spread of whole scans", count=False, off=True),
             Statistic("correlation of whole scans", count=False, off=True),
             Statistic("spread of the means per beam", count=False, off=True),
@@ -300,6 +304,22 @@ def _once(mask: BoolArray, stand: IntArray) -> BoolArray:
     return out
 
 
+def _crowded(far: BoolArray, inside: BoolArray, beside: int) -> float:
+    """Return how many outliers (k, b) have others so many beams beside them, less how many would by chance, in sds.
+
+    inside (k, b): which readings there are.
+    """
+    ends = np.clip(np.arange(far.shape[1])[:, np.newaxis] + np.array([-beside, beside + 1]), 0, far.shape[1])
+    about, there = (np.diff(_sums(mask)[:, ends], axis=2)[:, :, 0][far] for mask in (far, inside))
+    rate = np.count_nonzero(far) / max(np.count_nonzero(inside), 1)
+    return _root(np.count_nonzero(about > 1)) - _root(float(np.sum(1 - (1 - rate) ** (there - 1))))
+
+
+def _sums(mask: BoolArray) -> IntArray:
+    """Return how many of each row (k, b) are set before each column, and in all, (k, b + 1)."""
+    return np.pad(np.cumsum(mask, axis=1), ((0, 0), (1, 0)))
+
+
 def _between(z: FloatArray, free: FloatArray, group: IntArray) -> float:
     """Return the log of the mean squared group mean, each in deviations of what readings that scatter so give it.
 
@@ -333,7 +353,7 @@ def _share(hits: BoolArray) -> float:
     return _root(int(np.count_nonzero(hits)))
 
 
-def _root(count: int) -> float:
+def _root(count: float) -> float:
     return 2 * float(np.sqrt(count + 0.375))
 
 

@@ -68,6 +68,7 @@ class Echoes:
     origins (n, 3): the laser's pose in the map when each beam is fired, None where nobody knows it.
     known: what else was recorded at the stamp, by name, such as temperature [deg C]; past: of
     LAGGED, behind by first-order lags of LAGS, (k, l), where more than the present is known.
+    farthest [m]: the most that the laser reads.
     A beam that met nothing has a range of +inf in the stages OUTLIER and GRID, and of 0 before them.
     """
 
@@ -83,6 +84,7 @@ class Echoes:
     origins: FloatArray | None = None
     known: Mapping[str, float | FloatArray] = field(default_factory=dict)
     past: Mapping[str, FloatArray] = field(default_factory=dict)
+    farthest: float = 0.0
 
 
 class LaserEffect(Mechanism):

@@ -25,13 +25,16 @@ class HeavyTails(ReadingEffect):
         Parameter("core", "1", null=0.0, scale=0.5, lower=0.0, upper=1.5),
         Parameter("outliers", "1", null=0.0, scale=0.02, lower=0.0, upper=0.5),
         Parameter("reach", "m", null=0.1, scale=0.1, lower=0.001, upper=10.0),
+        Parameter("anywhere", "1", null=0.0, scale=1.0, lower=0.0, upper=1.0),
     )
+    forms = ({"anywhere": 0.0}, {"anywhere": 1.0})
     sentence = "large range errors are more frequent than with normal noise"
     formula = (
         "z · (1 − 2 / ν)^((1 − core) / 2) · √(ν / χ²_ν), ν = 1 / inverse_nu; "
-        "with probability outliers: reach / σ · n added, n normal"
+        "with probability outliers: reach / σ · n added, n normal; "
+        "with anywhere = 1: in its place a reading even from 0 to the most that the laser reads"
     )
-    source = "assumed; ν 3-10; outliers 1e-4 to 1e-2 of the readings"
+    source = "assumed; ν 3-10; outliers 1e-4 to 1e-2 of the readings; anywhere: Thrun, Burgard, Fox 2005, z_rand"
     empirical = True
     random = True
 
@@ -44,6 +47,9 @@ class HeavyTails(ReadingEffect):
             noise = noise * (narrower * np.sqrt(nu / self.rng.chisquare(nu, noise.shape)))
         if self.values["outliers"] > 0:
             wild = self.rng.random(noise.shape) < self.values["outliers"]
-            off = self.values["reach"] * self.rng.standard_normal(noise.shape)
+            if self.values["anywhere"] > 0.5:
+                off = echoes.farthest * self.rng.random(noise.shape) - echoes.mean
+            else:
+                off = self.values["reach"] * self.rng.standard_normal(noise.shape)
             noise = noise + np.where(wild, off / np.maximum(echoes.sd, _LEAST), 0.0)
         return replace(echoes, noise=noise)

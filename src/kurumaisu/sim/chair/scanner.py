@@ -128,6 +128,7 @@ class Scanner:
             readings=ranges,
             origins=origins,
             known=self.sight.rates(),
+            farthest=self._laser.range_max,
         )
         # What the law, without its noise, makes of the range that it means by a reading: rounding and gate are left.
         return error.reading(error.range(self._chain.read(echoes)), np.zeros(len(ranges))), returns, ranges

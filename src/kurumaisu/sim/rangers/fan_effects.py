@@ -92,6 +92,7 @@ class FanEffects:
             readings=look.ranges,
             origins=look.origins,
             known=self._rates(),
+            farthest=fan.range_max,
         )
         readings = self._chain.read(echoes)
         beyond = readings > fan.range_max

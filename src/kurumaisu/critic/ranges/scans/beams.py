@@ -156,7 +156,7 @@ def read(
     mean, sd = shots.laser.error.mean(seen.ranges) + moved, shots.laser.error.deviation(seen.ranges)
     known = {name: values[:, np.newaxis] for name, values in shots.known.items()}
     parts = (seen.ranges, seen.incidence, seen.returns, mean, sd, noise, seen.ranges, seen.origins, known, shots.past)
-    return chain.read(Echoes(shots.stamps[:, np.newaxis], shots.laser.bearings, *parts))
+    return chain.read(Echoes(shots.stamps[:, np.newaxis], shots.laser.bearings, *parts, shots.laser.range_max))
 
 
 def predict(

@@ -14,7 +14,7 @@ from kurumaisu import effects
 from kurumaisu.critic.engine.form_error import SHARES
 from kurumaisu.critic.ranges.search.effect_sets import LINE_ERROR, WEAK_PRIOR, FittedForms, FormPosterior, confusion
 from kurumaisu.critic.ranges.signals.coefficient_blocks import Block
-from kurumaisu.critic.ranges.signals.form_error import FormFamily, Shares, integrated_out, over_shares
+from kurumaisu.critic.ranges.signals.form_error import FormFamily, Shares, integrated_out, over_shares, priors_in
 from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import ALIKE, AS_ALIKE, CurveEvidence, curve_evidence
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS, odds
@@ -186,8 +186,7 @@ class _Doubted:
         some, own = self._gram[np.ix_(use, use)], np.arange(len(use) - 1 - len(free), len(use) - 1)
 
         def prior(shares: Shares) -> FloatArray:
-            each = (family.scaled(self._gram[span, span], power, *shares) for span, family, power in drawn)
-            return np.asarray(block_diag(*each))
+            return np.asarray(block_diag(*priors_in(self._gram, drawn, shares)))
 
         nats = over_shares(lambda shares: _marginal(some, own, prior(shares)))
         best = max(nats, key=lambda shares: nats[shares])

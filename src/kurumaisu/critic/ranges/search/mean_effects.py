@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,7 @@ from kurumaisu.critic.ranges.signals.form_error import (
     form_family,
     integrated_out,
     over_shares,
+    priors_in,
 )
 from kurumaisu.critic.unknown.curves import curve_evidence
 from kurumaisu.critic.values.policy import UNKNOWN_ODDS
@@ -157,14 +159,12 @@ def _doubted(
     gram = there.products(refitted.normal, np.concatenate([*parts, refitted.slopes, *free, *signals], axis=2), left)
     ends = np.cumsum([count, refitted.slopes.shape[2], *(part.shape[2] for part in free)])
     powers = np.diag(gram)[ends[-1] : -1].tolist()
+    spans = [slice(low, high) for low, high in pairwise(ends[1:].tolist())]
+    families = [(span, curve, power) for span, (curve, _), power in zip(spans, curves, powers, strict=True)]
     drawn, keep = np.arange(count, ends[-1]), np.r_[np.arange(count), len(gram) - 1]
 
     def weighed(shares: Shares) -> tuple[FloatArray, float]:
-        priors = [
-            curve.scaled(gram[low:high, low:high], power, *shares)
-            for (curve, _), low, high, power in zip(curves, ends[1:-1], ends[2:], powers, strict=True)
-        ]
-        prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors)
+        prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors_in(gram, families, shares))
         made = integrated_out(gram, drawn, prior)
         volume = np.linalg.slogdet(np.eye(len(drawn)) + gram[np.ix_(drawn, drawn)] @ prior)[1]
         return made[np.ix_(keep, keep)], -0.5 * float(made[-1, -1] + volume)

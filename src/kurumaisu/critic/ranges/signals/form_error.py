@@ -8,7 +8,7 @@ size is what nobody can refuse of a form. No effect is named: what it follows is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,6 +142,13 @@ def over_shares(weigh: Callable[[Shares], float]) -> dict[Shares, float]:
             shares = (share, best[1]) if i == 0 else (best[0], share)
             nats[shares] = weigh(shares)
     return nats
+
+
+def priors_in(
+    gram: FloatArray, parts: Iterable[tuple[slice, FormFamily, float]], shares: Shares
+) -> Iterator[FloatArray]:
+    """Yield the priors (n, n) of families: where in the gram each has its coefficients, and power of what it is of."""
+    return (family.scaled(gram[span, span], power, *shares) for span, family, power in parts)
 
 
 def integrated_out(gram: FloatArray, columns: IntArray, prior: FloatArray) -> FloatArray:
