@@ -180,6 +180,21 @@ def test_noise_of_heavy_tails_hardly_goes_as_far_as_readings_of_something_else(t
     assert bursts - plain > 10.0
 
 
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_outliers_that_come_together_are_more_than_chance_however_few_they_are(tmp_path, seed):
+    assembly = _assembly(tmp_path)
+    statistics = Statistics(assembly, ScanNoise(0.002, 0.001, 1e-4, 1.0))
+    missed = np.empty((*assembly.residual.shape, 0))
+    simulate, names = ScatterSimulator(assembly.shots, assembly.marks, statistics, missed), statistics.names()
+    many, crowded = (names.index(n) for n in names if n.startswith(("readings more than 6 sd", "more than chance")))
+    even = at("laser.heavy_tails", outliers=0.03, anywhere=1.0)
+    few, bursts = (at("laser.crosstalk", probability=p, width=w) for p, w in ((0.03, 6.3), (0.3, 0.3)))
+    for one, least, most in ((even, -3.0, 3.0), (few, -3.0, 3.0), (bursts, 5.0, 30.0)):
+        numbers = simulate([one], seed)
+        assert numbers[many] > 10.0
+        assert least < numbers[crowded] < most
+
+
 @pytest.mark.parametrize("probability", [0.001, 0.02])
 def test_a_few_lost_readings_are_told_as_too_few_to_matter(tmp_path, probability):
     """Half a percent of anything is where it begins to."""

@@ -68,7 +68,6 @@ CASES = (
     Case("lag of 0.2 s", lag=0.2),
     Case("a slip in 2 % of seconds", slips=0.02),
 )
-COEFFICIENTS = ("slope", "intercept")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
