@@ -80,7 +80,7 @@ def _planned(
     noise = ScanNoise(*truth, *_COMMON)
     count = sum(len(form.columns) for form in assembly.forms)
     normal = NormalEquations(np.empty((0, 0)), noise, noise, assembly.first, 0)
-    gram = assembly.products(normal, assembly.columns[:, :, :count].astype(float), np.zeros_like(assembly.residual))
+    gram = assembly.products(normal, [assembly.columns[:, :, :count]], np.zeros_like(assembly.residual))
     return assembly.forms, gram
 
 

@@ -56,7 +56,7 @@ def pose_curves_left(fit: ParameterFit, normal: NormalEquations) -> bool:
     made = list(pose_curves(there.shots, there.marks, there.poses))
     if not made:
         return False
-    gram = there.products(noise, np.concatenate([fit.slopes, *(one for _, one in made)], axis=2), fit.left)
+    gram = there.products(noise, [fit.slopes, *(one for _, one in made)], fit.left)
     rest, start = np.arange(fit.slopes.shape[2]), fit.slopes.shape[2]
     share = float(np.log(UNKNOWN_ODDS / len(made)))
     for block, columns in made:
@@ -156,7 +156,7 @@ def _doubted(
     count = sum(part.shape[2] for part in parts)
     free = [curve.columns(there.shots, there.marks.seen) for curve, _ in curves]
     signals = [change[:, :, np.newaxis] for _, change in curves]
-    gram = there.products(refitted.normal, np.concatenate([*parts, refitted.slopes, *free, *signals], axis=2), left)
+    gram = there.products(refitted.normal, [*parts, refitted.slopes, *free, *signals], left)
     ends = np.cumsum([count, refitted.slopes.shape[2], *(part.shape[2] for part in free)])
     powers = np.diag(gram)[ends[-1] : -1].tolist()
     spans = [slice(low, high) for low, high in pairwise(ends[1:].tolist())]

@@ -8,6 +8,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kurumaisu.critic.ranges.noise.reading_noise import OUTLIER, BeamNoise, estimate_reading_noise, expected_readings
 from kurumaisu.critic.ranges.noise.scan_noise import (
@@ -287,14 +288,18 @@ class Assembly:
         out._nuisance = slice(count, out.columns.shape[2])
         return out
 
-    def products(self, normal: NormalEquations, columns: FloatArray, residual: FloatArray) -> FloatArray:
-        """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known."""
+    def products(
+        self, normal: NormalEquations, parts: Sequence[FloatArray | NDArray[np.float32]], residual: FloatArray
+    ) -> FloatArray:
+        """Return the normal equations of other columns (k, b, m) and another residual (k, b), in the noise known.
+
+        parts: of these columns.
+        """
         other = copy(self)
-        other.columns, other.residual = columns.astype(np.float32), residual
-        known = np.isfinite(columns).all(axis=2) & np.isfinite(residual)
-        grams, cross = other._crossed(
-            replace(normal.beam_noise, valid=normal.beam_noise.valid & known), columns.shape[2]
-        )
+        other.columns, other.residual = np.concatenate(parts, axis=2, dtype=np.float32), residual
+        known = np.isfinite(other.columns).all(axis=2) & np.isfinite(residual)
+        beam = replace(normal.beam_noise, valid=normal.beam_noise.valid & known)
+        grams, cross = other._crossed(beam, other.columns.shape[2])
         return without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
 
     def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], OffsetProducts]:

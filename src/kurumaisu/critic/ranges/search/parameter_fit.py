@@ -155,8 +155,7 @@ def _step(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the step of each free parameter, its sd, and the coefficients of the block; parts: columns of both."""
     columns, block = parts
-    every = np.concatenate([*(column[:, :, np.newaxis] for column in columns), block], axis=2)
-    gram = assembly.products(normal, every, left)
+    gram = assembly.products(normal, [*(column[:, :, np.newaxis] for column in columns), block], left)
     prior = np.r_[np.array([each.prior for each in free]), np.ones(block.shape[2])]
     inverse = np.linalg.inv(gram[:-1, :-1] * np.outer(prior, prior) + np.eye(len(prior)))
     step, sds = prior * (inverse @ (prior * gram[:-1, -1])), prior * np.sqrt(np.diag(inverse))
@@ -180,7 +179,7 @@ def _doubt(
     slopes, guessed, signals = parts
     if not guessed:
         return np.zeros(len(free))
-    gram = assembly.products(normal, np.stack([*slopes, *signals], axis=-1), assembly.residual)[:-1, :-1]
+    gram = assembly.products(normal, [np.stack([*slopes, *signals], axis=-1)], assembly.residual)[:-1, :-1]
     norms = np.sqrt(np.maximum(np.diag(gram), 1e-300))
     count = len(free)
     alike = (gram / np.outer(norms, norms))[:count, count:]
@@ -207,7 +206,7 @@ def _other_curves(
     parts = [curve.columns(assembly.shots, assembly.marks.seen) for curve in curves.values()]
     known = [*(slope[:, :, np.newaxis] for slope in slopes), block, *(signals[i][:, :, np.newaxis] for i in curves)]
     every = np.concatenate([*known, *parts], axis=2)
-    gram = assembly.products(normal, every, left)
+    gram = assembly.products(normal, [every], left)
     fixed = len(slopes) + block.shape[2]
     powers = np.diag(gram)[fixed : fixed + len(curves)]
     ends = np.cumsum([fixed + len(curves), *(part.shape[2] for part in parts)])
