@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Recordings of robots in which something is hidden."""
+
 import zlib
 from pathlib import Path
 import numpy as np
@@ -8,10 +9,13 @@ from kurumaisu.bench.strangers.fell.files import write
 from kurumaisu.bench.strangers.fell.judge import Judge
 from kurumaisu.bench.strangers.fell.scene import stage
 
-WRONG = ("poses in mm,degrees,y mirrored,swapped axes,clockwise headings,stamps in ms,speed reversed,"
-         "a clock seconds off,poses of another drive,a drive given twice,ranges in mm,mirrored map,"
-         "mirrored fan,another map").split(",")
+WRONG = (
+    "poses in mm,degrees,y mirrored,swapped axes,clockwise headings,stamps in ms,speed reversed,"
+    "a clock seconds off,poses of another drive,a drive given twice,ranges in mm,mirrored map,"
+    "mirrored fan,another map"
+).split(",")
 PLAIN = ("base.steering_law", "base.sign", "laser.saturation", "laser.mixed_pixels")  # have one equation, or are huge
+
 
 def make(folder: Path, kind: str, seed: int) -> None:
     """Writes a case of a kind into a folder, or raises RuntimeError where none is strong enough."""
@@ -42,17 +46,31 @@ def make(folder: Path, kind: str, seed: int) -> None:
         if all(z >= 10 and b >= bar for z, b in score):
             break
         low = min(min(z / 10, b / max(bar, 1) if z >= 10 and bar else 9) for z, b in score)
-        size *= float(np.clip(1.15 / max(low, .05), 1.35, 2.5))
+        size *= float(np.clip(1.15 / max(low, 0.05), 1.35, 2.5))
     else:
         raise RuntimeError(f"{kind} {seed}: no case that is strong enough")
-    told = [{"id": c.id, "z": round(z, 1), "beside": round(b, 1), "form": "other" if c.other else "usual",
-             "parameters": {k: round(float(c.p[k]), 6) for k in c.told}} for c, (z, b) in zip(causes, score)]
+    told = [
+        {
+            "id": c.id,
+            "z": round(z, 1),
+            "beside": round(b, 1),
+            "form": "other" if c.other else "usual",
+            "parameters": {k: round(float(c.p[k]), 6) for k in c.told},
+        }
+        for c, (z, b) in zip(causes, score)
+    ]
     if kind == "unknown":
         unknown = {"channel": channel, "covariates": [of], "z": told[0]["z"], "beside": told.pop()["beside"]}
     what = wrong or ", ".join(c.id for c in causes) + (f" follows {of}" if of else "") or "nothing"
     where = {"speed": " in drives of one speed only", "left": " in drives of left turns only", "": ""}[limit]
     sentence = f"{sc.robot.kind}, {sc.ref.name}, {sc.las.name if sc.las else 'no laser'}: {what}{where}"
     neutral = [i for i in ("base.process_noise", "laser.heavy_tails") if i not in [c.id for c in causes]]
-    truth = {"kind": kind, "causes": told, "neutral": neutral, "unknown": unknown, "wrong": wrong or None,
-             "sentence": sentence}
+    truth = {
+        "kind": kind,
+        "causes": told,
+        "neutral": neutral,
+        "unknown": unknown,
+        "wrong": wrong or None,
+        "sentence": sentence,
+    }
     write(Path(folder), rng, sc, truth, wrong)

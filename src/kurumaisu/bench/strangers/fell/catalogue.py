@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What can be hidden, and how large it is drawn."""
+
 import re
 from typing import Any
 import numpy as np
 from kurumaisu.bench.strangers.fell.plant import Cause
+
 # name kind size ...; kinds: s signed size, p positive size, u uniform, c a choice, r a seed; ! is told in truth.json
-TABLE = dict(u.strip().split(": ") for u in """
+TABLE = dict(
+    u.strip().split(": ")
+    for u in """
 base.dac_zero_f: offset! s .01; base.dac_zero_s: offset! s .01; base.dac_quantisation: step! p .025;
 base.steering_law: flip! c 1; base.delay: delay! p .05; base.sign: factor_v! c 1 factor_w! c -1;
 base.dead_zone_v: width! p .03; base.dead_zone_w: width! p .03; base.backlash: play p .05;
@@ -26,19 +30,31 @@ laser.range_noise: share! p .4; laser.incidence_noise: gain p .5; laser.common_m
 laser.beam_correlation: rho! c .3 .45; laser.heavy_tails: outliers! p .03 reach u .08 .2;
 laser.mixed_pixels: probability c .5 .7; laser.dropout: probability p .05; laser.saturation: inverse_far! p .3;
 laser.crosstalk: probability! u .2 .4 width! p .4 drift! u .2 .8 reach u 2 4; laser.quantisation: step! p .015;
-world.map_error: sd! p .015 seed r""".split(";"))
+world.map_error: sd! p .015 seed r""".split(";")
+)
 IDS = list(TABLE)
 VOLTS = ("base.dac_zero_f", "base.dac_zero_s", "base.dac_quantisation", "base.steering_law", "base.cross_v_to_w")
 POSES = ("base.marker_x", "base.marker_y", "base.marker_yaw", "base.clock_scale", "unknown.base.pose")
-UNKNOWN = [(ch, *u.split()) for ch, all_ in {
-    "base.v": "humidity 0.04, x 0.06, time_since_rest 0.12, heading 0.05, time 0.08",
-    "base.w": "humidity 0.02, y 0.03, time 0.05, heading 0.03",
-    "base.pose": "humidity 0.02, x 0.02, y 0.02, time 0.02",
-    "laser.range": "humidity 0.008, direction 0.01, hit_x 0.01, hit_y 0.01, abs_v 0.03, time 0.015",
-    "laser.spread": "humidity 0.25, direction 0.3, hit_x 0.3, abs_w 0.5, time 0.5"}.items() for u in all_.split(", ")]
-CONFOUNDED = [(f"base.{i}", limit) for limit, all_ in (
-    ("speed", "gain_v curvature_v dead_zone_v understeer"),
-    ("left", "left_right_gain gain_w veer curvature_w cross_w_to_v lag_w")) for i in all_.split()]
+UNKNOWN = [
+    (ch, *u.split())
+    for ch, all_ in {
+        "base.v": "humidity 0.04, x 0.06, time_since_rest 0.12, heading 0.05, time 0.08",
+        "base.w": "humidity 0.02, y 0.03, time 0.05, heading 0.03",
+        "base.pose": "humidity 0.02, x 0.02, y 0.02, time 0.02",
+        "laser.range": "humidity 0.008, direction 0.01, hit_x 0.01, hit_y 0.01, abs_v 0.03, time 0.015",
+        "laser.spread": "humidity 0.25, direction 0.3, hit_x 0.3, abs_w 0.5, time 0.5",
+    }.items()
+    for u in all_.split(", ")
+]
+CONFOUNDED = [
+    (f"base.{i}", limit)
+    for limit, all_ in (
+        ("speed", "gain_v curvature_v dead_zone_v understeer"),
+        ("left", "left_right_gain gain_w veer curvature_w cross_w_to_v lag_w"),
+    )
+    for i in all_.split()
+]
+
 
 def draw(i: str, rng: np.random.Generator, size: float = 1.0, other: bool = False, usual: bool = False) -> Cause:
     """A cause with its sizes drawn, or at its usual size."""
@@ -58,6 +74,7 @@ def draw(i: str, rng: np.random.Generator, size: float = 1.0, other: bool = Fals
     if i == "base.slope" and not usual:
         p = dict(zip(("climb_x", "climb_y"), 0.02 * much * np.array([np.cos(f := rng.uniform(0, 6.28)), np.sin(f)])))
     return Cause(i, p, other, () if other else tuple(re.findall(r"(\w+)!", TABLE[i])))
+
 
 def draw_unknown(rng: np.random.Generator, size: float) -> tuple[Cause, str, str]:
     """Something that the catalogue does not have."""

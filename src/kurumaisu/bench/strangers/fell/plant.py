@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """What the base does: from what is asked for, over the converter, motors, tyres and casters, to its way."""
+
 from collections import namedtuple
 from dataclasses import dataclass
 from typing import Any
@@ -7,24 +8,31 @@ import numpy as np
 from scipy.signal import lfilter
 
 DT = 0.02
-LAWS = {"published": ((-0.499211, 0.104181), (-0.469278, -0.169476)),
-        "corrected": ((-0.499211, -0.104181), (-0.469278, 0.169476))}
+LAWS = {
+    "published": ((-0.499211, 0.104181), (-0.469278, -0.169476)),
+    "corrected": ((-0.499211, -0.104181), (-0.469278, 0.169476)),
+}
 FWD = ((1.32402, 0.127906), (2.07369, -0.108783))
+
 
 @dataclass
 class Cause:
     """Something hidden: id, sizes, and whether its equation is the other one."""
+
     id: str
     p: dict[str, Any]
     other: bool = False
     told: tuple[str, ...] = ()
 
+
 # a base: how it is driven, and how unsteady it is
 Robot = namedtuple("Robot", "kind volts vmax wmax law sd_v sd_w tau rate ramp style size meta")
+
 
 @dataclass
 class Way:
     """A trajectory on the grid's edges, with the rates and the scale of their noise in its cells."""
+
     x: np.ndarray
     y: np.ndarray
     th: np.ndarray
@@ -38,10 +46,12 @@ class Way:
         """A quantity of the cells at times."""
         return np.interp(t, (np.arange(len(self.x) - 1) + 0.5) * DT, self.cells[name])
 
+
 def to_volts(rate: np.ndarray, law: tuple) -> np.ndarray:
     """Voltage that a rate is asked for with."""
     (a, b), (c, d) = law
     return np.where(rate > 0, a * rate + b, np.where(rate < 0, c * rate + d, 0.0))
+
 
 def from_volts(u: np.ndarray, law: tuple) -> np.ndarray:
     """Rate that a voltage makes, in a law with a true dead zone."""
@@ -49,17 +59,20 @@ def from_volts(u: np.ndarray, law: tuple) -> np.ndarray:
     s = np.sign(a)
     return np.where(s * u > s * b, (u - b) / a, np.where(s * u < s * d, (u - d) / c, 0.0))
 
+
 def _cells(t: np.ndarray, val: np.ndarray, n: int) -> np.ndarray:
     """Means over the cells of what holds from each row to the next."""
     e, tt = np.arange(n + 1) * DT, np.concatenate([[min(0.0, t[0]) - 1e-9], t, [max(t[-1], n * DT) + 1.0]])
     cum = np.concatenate([[0.0, 0.0], np.cumsum(val * np.diff(tt[1:]))])
     return np.diff(np.interp(e, tt, cum)) / DT
 
+
 def _play(w: np.ndarray, p: float) -> np.ndarray:
     out, y = np.empty_like(w), 0.0
     for i, u in enumerate(w.tolist()):
         out[i] = y = min(max(y, u - p), u + p)
     return out
+
 
 def _ramp(v: np.ndarray, up: float, down: float) -> np.ndarray:
     out, y, a, b = np.empty_like(v), 0.0, up * DT, down * DT
@@ -69,10 +82,12 @@ def _ramp(v: np.ndarray, up: float, down: float) -> np.ndarray:
         out[i] = y
     return out
 
+
 def _lag(v: np.ndarray, tau: float) -> np.ndarray:
     a = np.exp(-DT / max(tau, 1e-3))
-    g = tau / DT * (1 - a)       # mean over the cell of an exact first order
+    g = tau / DT * (1 - a)  # mean over the cell of an exact first order
     return v * (1 - g) + lfilter([0, 1 - a], [1, -a], v) * g
+
 
 def _dead(u: np.ndarray, k: Cause | None, zone: tuple[float, float]) -> np.ndarray:
     """Static friction (other) or a wider dead band of the controller (usual)."""
@@ -82,6 +97,7 @@ def _dead(u: np.ndarray, k: Cause | None, zone: tuple[float, float]) -> np.ndarr
     lim = np.where(u > 0, zone[0] + 1.1 * width, zone[1] + 0.9 * width)
     return np.where(np.abs(u) < lim, 0.0, u) if k.other else np.sign(u) * np.maximum(np.abs(u) - width, 0)
 
+
 def _law(robot: Robot, c: dict[str, Cause], v: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What the converter and the joystick's input make of the rows."""
     vf, vs = to_volts(v, FWD), to_volts(w, LAWS[robot.law])
@@ -90,12 +106,15 @@ def _law(robot: Robot, c: dict[str, Cause], v: np.ndarray, w: np.ndarray) -> tup
         vf, vs = cut(vf / k.p["step"]) * k.p["step"], cut(vs / k.p["step"]) * k.p["step"]
     if k := c.get("base.cross_v_to_w"):
         vs = vs + k.p["share"] * (np.sign(vf) * np.abs(vf) ** 1.5 if k.other else vf)
-    vf, vs = (u + c[i].p["offset"] * (1 - 0.3 * np.abs(u) * c[i].other) if i in c else u for u, i in (
-        (vf, "base.dac_zero_f"), (vs, "base.dac_zero_s")))
+    vf, vs = (
+        u + c[i].p["offset"] * (1 - 0.3 * np.abs(u) * c[i].other) if i in c else u
+        for u, i in ((vf, "base.dac_zero_f"), (vs, "base.dac_zero_s"))
+    )
     vf = _dead(vf, c.get("base.dead_zone_v"), (0.1279, 0.1088))
     vs = _dead(vs, c.get("base.dead_zone_w"), (0.1695, 0.1042))
-    known = "base.steering_law" not in c and robot.law == "published"       # then voltages are what they stand for
+    known = "base.steering_law" not in c and robot.law == "published"  # then voltages are what they stand for
     return from_volts(vf, FWD), w if known else from_volts(vs, LAWS["corrected"])
+
 
 def rates(robot: Robot, causes: list[Cause], rows: np.ndarray, n: int, ctx: dict[str, np.ndarray]) -> dict:
     """Mean rates v, w, vy in the cells, and the scale of their noise. ctx: th, x, y, humidity in the cells."""
@@ -122,9 +141,12 @@ def rates(robot: Robot, causes: list[Cause], rows: np.ndarray, n: int, ctx: dict
         w = w * (1 + k.p["asymmetry"] / 2 * (np.tanh(w / (0.15 * robot.wmax)) if k.other else np.sign(w)))
     if k := c.get("base.reverse_gain"):
         v = np.where(v < 0, v * (1 + k.p["gain"] * (np.tanh(np.abs(v) / 0.08) if k.other else 1)), v)
-    v, w = (u * np.maximum(1 - c[i].p["curvature"] * (np.abs(u) ** 1.7 * top ** -0.7 if c[i].other else np.abs(u)), 0.1)
-            if i in c else u for u, i, top in (
-                (v, "base.curvature_v", robot.vmax), (w, "base.curvature_w", robot.wmax)))
+    v, w = (
+        u * np.maximum(1 - c[i].p["curvature"] * (np.abs(u) ** 1.7 * top**-0.7 if c[i].other else np.abs(u)), 0.1)
+        if i in c
+        else u
+        for u, i, top in ((v, "base.curvature_v", robot.vmax), (w, "base.curvature_w", robot.wmax))
+    )
     if k := c.get("base.saturation"):
         soft = (lambda u, m: u / (1 + np.abs(u / m) ** 8) ** 0.125) if k.other else (lambda u, m: np.clip(u, -m, m))
         v, w = soft(v, 1 / k.p["inverse_v"]), soft(w, 1 / k.p["inverse_w"])
@@ -136,20 +158,34 @@ def rates(robot: Robot, causes: list[Cause], rows: np.ndarray, n: int, ctx: dict
     if k := c.get("base.accel_limit"):
         a, b, f = 1 / k.p["slowness_v"], 1 / k.p["slowness_w"], 1.6 if k.other else 1.0
         v, w = _ramp(v, a, f * a), _ramp(w, b, f * b)
-    v, w = (u if not (k := c.get(i)) else .65 * _lag(u, .6 * k.p["tau"]) + .35 * _lag(u, 1.74 * k.p["tau"]) if k.other
-            else _lag(u, k.p["tau"]) for u, i in ((v, "base.lag_v"), (w, "base.lag_w")))
+    v, w = (
+        u
+        if not (k := c.get(i))
+        else 0.65 * _lag(u, 0.6 * k.p["tau"]) + 0.35 * _lag(u, 1.74 * k.p["tau"])
+        if k.other
+        else _lag(u, k.p["tau"])
+        for u, i in ((v, "base.lag_v"), (w, "base.lag_w"))
+    )
     moving = np.abs(v) > 0.004
     th, x, y, hum = (ctx[k][:n] for k in ("th", "x", "y", "humidity"))
     for k in causes:
         if k.id in ("unknown.base.v", "unknown.base.w"):
             a, of, kk, f = k.p["a"], k.p["of"], k.p["k"], k.p["f"]
             rest = time - np.maximum.accumulate(np.where(on, 0, time))
-            a = a * {"humidity": (hum - 45) / 8, "x": np.sin(kk * x + f), "y": np.sin(kk * y + f),
-                     "time_since_rest": np.exp(-rest / 2.5), "heading": np.cos(2 * th + f),
-                     "time": (time / k.p["period"] + f) % 1 < 0.3}[of]
+            a = (
+                a
+                * {
+                    "humidity": (hum - 45) / 8,
+                    "x": np.sin(kk * x + f),
+                    "y": np.sin(kk * y + f),
+                    "time_since_rest": np.exp(-rest / 2.5),
+                    "heading": np.cos(2 * th + f),
+                    "time": (time / k.p["period"] + f) % 1 < 0.3,
+                }[of]
+            )
             v, w = (v * (1 + a), w) if k.id == "unknown.base.v" else (v, w + a * moving)
     if k := c.get("base.understeer"):
-        w = w * (np.exp(-k.p["k"] * np.abs(v) ** 1.5 * robot.vmax ** 0.5) if k.other else 1 / (1 + k.p["k"] * v * v))
+        w = w * (np.exp(-k.p["k"] * np.abs(v) ** 1.5 * robot.vmax**0.5) if k.other else 1 / (1 + k.p["k"] * v * v))
     if k := c.get("base.veer"):
         w = w + k.p["curvature"] * v * (np.where(v > 0, 1.1, 0.8) if k.other else 1)
     if k := c.get("base.cross_w_to_v"):
@@ -172,8 +208,17 @@ def rates(robot: Robot, causes: list[Cause], rows: np.ndarray, n: int, ctx: dict
         sv, sw = sv * f, sw * f
     return {"v": v, "w": w, "vy": vy, "sv": sv, "sw": sw}
 
-def travel(robot: Robot, causes: list[Cause], rows: np.ndarray, n: int, start: tuple, ctx: dict,
-           noise: np.ndarray | None = None, passes: int = 1) -> Way:
+
+def travel(
+    robot: Robot,
+    causes: list[Cause],
+    rows: np.ndarray,
+    n: int,
+    start: tuple,
+    ctx: dict,
+    noise: np.ndarray | None = None,
+    passes: int = 1,
+) -> Way:
     """The way that the base takes; with noise its poses are written into ctx as those that effects follow."""
     for _ in range(passes):
         r = rates(robot, causes, rows, n, ctx)

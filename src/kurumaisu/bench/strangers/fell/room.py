@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Rooms of boxes: their walls, the way light takes in them, and their files."""
+
 from dataclasses import dataclass
 import numpy as np
+
 
 @dataclass
 class Room:
     """Boxes (cx, cy, angle, sx, sy) with a flag for dark paint; walls are their edges inside of the room."""
+
     width: float
     height: float
     boxes: np.ndarray
@@ -17,7 +20,7 @@ class Room:
             k = np.array([[-sx, -sy], [sx, -sy], [sx, sy], [-sx, sy]]) / 2
             p = k @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) + (cx, cy)
             e = [np.concatenate([p[j], p[(j + 1) % 4]]) for j in range(4)]
-            if i < 4:                                             # of the room's own walls only the inner side
+            if i < 4:  # of the room's own walls only the inner side
                 e = [min(e, key=lambda q: np.hypot(q[0] + q[2] - self.width, q[1] + q[3] - self.height))]
             walls, owner = walls + e, owner + [i] * len(e)
         self.walls, self.owner = np.array(walls), np.array(owner)
@@ -53,9 +56,12 @@ class Room:
         """The Stage world."""
         out = ['name "room"', 'define wall model ( color "gray30" gui_move 0 )']
         for i, ((cx, cy, a, sx, sy), dark) in enumerate(zip(self.boxes, self.dark)):
-            out.append(f'wall ( name "b{i}" pose [{cx:.6f} {cy:.6f} 0 {np.degrees(a):.9f}] '
-                       f'size [{sx:.6f} {sy:.6f} 1.0] color "{"black" if dark else "white"}" )')
+            out.append(
+                f'wall ( name "b{i}" pose [{cx:.6f} {cy:.6f} 0 {np.degrees(a):.9f}] '
+                f'size [{sx:.6f} {sy:.6f} 1.0] color "{"black" if dark else "white"}" )'
+            )
         return "\n".join(out) + "\n"
+
 
 def draw_room(rng: np.random.Generator, reach: float) -> Room:
     """A hall with posts, a flat, a corridor with niches, or a workshop with benches."""
@@ -66,20 +72,31 @@ def draw_room(rng: np.random.Generator, reach: float) -> Room:
     elif sort == "corridor":
         w, h = rng.uniform(13, 18), rng.uniform(3.6, 4.5)
     w, h, u = round(w, 3), round(h, 3), rng.uniform
-    boxes = [(w / 2, -0.05, 0, w + 0.2, 0.1), (w / 2, h + 0.05, 0, w + 0.2, 0.1),
-             (-0.05, h / 2, 0, 0.1, h), (w + 0.05, h / 2, 0, 0.1, h)]
+    boxes = [
+        (w / 2, -0.05, 0, w + 0.2, 0.1),
+        (w / 2, h + 0.05, 0, w + 0.2, 0.1),
+        (-0.05, h / 2, 0, 0.1, h),
+        (w + 0.05, h / 2, 0, 0.1, h),
+    ]
     if sort == "hall":
         for fx, fy in ((0.3, 0.3), (0.7, 0.32), (0.68, 0.72), (0.28, 0.7)):
-            boxes.append((w * (fx + u(-.05, .05)), h * (fy + u(-.05, .05)), rng.choice([0.0, .785]), s := u(.2, .4), s))
+            boxes.append(
+                (w * (fx + u(-0.05, 0.05)), h * (fy + u(-0.05, 0.05)), rng.choice([0.0, 0.785]), s := u(0.2, 0.4), s)
+            )
     elif sort == "flat":
         side, x = (h - u(1.5, 1.8)) / 2, w * u(0.45, 0.55)
         boxes += [(x, side / 2, 0, 0.12, side), (x, h - side / 2, 0, 0.12, side), (w - 0.3, h * 0.8, 0, 0.6, 0.9)]
     elif sort == "corridor":
         for k in range(4):
-            boxes.append((w * (k + u(.3, .7)) / 4, abs((0 if k % 2 else h) - (d := u(.25, .6)) / 2), 0, u(.6, 1.4), d))
+            boxes.append(
+                (w * (k + u(0.3, 0.7)) / 4, abs((0 if k % 2 else h) - (d := u(0.25, 0.6)) / 2), 0, u(0.6, 1.4), d)
+            )
     else:
-        boxes += [(w * 0.3, 0.35, 0, u(1, 1.8), 0.7), (w - 0.4, h * 0.35, 0, 0.8, u(0.8, 1.5)),
-                  (0.6, h - 0.6, u(0.3, 0.9), 0.9, 0.5)]
+        boxes += [
+            (w * 0.3, 0.35, 0, u(1, 1.8), 0.7),
+            (w - 0.4, h * 0.35, 0, 0.8, u(0.8, 1.5)),
+            (0.6, h - 0.6, u(0.3, 0.9), 0.9, 0.5),
+        ]
     boxes += [(w - 0.35, u(0.4, 0.6), u(0.2, 0.6), 0.5, 0.4)] if sort != "workshop" else []
     dark = np.array([True, False, *(rng.random(len(boxes) - 2) < 0.4)])
     return Room(w, h, np.round(np.array(boxes, float), 6), dark)

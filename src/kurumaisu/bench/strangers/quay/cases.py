@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """The kinds of cases: what is hidden in a recording, drawn until it is strong enough."""
+
 import json
 from pathlib import Path
 from typing import Any
@@ -12,20 +13,39 @@ from kurumaisu.bench.strangers.quay.causes import ALL, PLAIN, VOLTS, draw, draw_
 from kurumaisu.bench.strangers.quay.driving import MANNERS, make_drive, measure, scan_times
 from kurumaisu.bench.strangers.quay.scans import means, rays, read
 from kurumaisu.bench.strangers.quay.score import Judge
-from kurumaisu.bench.strangers.quay.things import Laser, Reference, Robot, Room, draw_laser, draw_reference, draw_robot, draw_room
+from kurumaisu.bench.strangers.quay.things import (
+    Laser,
+    Reference,
+    Robot,
+    Room,
+    draw_laser,
+    draw_reference,
+    draw_robot,
+    draw_room,
+)
 from kurumaisu.bench.strangers.quay.writing import answers, ask, save, setting, tables
 from kurumaisu.bench.strangers.quay.wrong import spoil
 
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 NEUTRAL = ["base.process_noise", "laser.heavy_tails", "laser.dropout"]
 NOT_FORM = PLAIN
-CONFOUNDED = (("base.gain_v", "one speed"), ("base.curvature_v", "one speed"), ("base.gain_w", "one side"),
-              ("base.left_right_gain", "one side"), ("base.gain_w", "one speed"), ("base.curvature_w", "one speed"))
-CLASH = (("base.gain_v", "base.payload", "base.curvature_v", "base.sign", "base.saturation"),
-         ("base.gain_w", "base.payload", "base.curvature_w", "base.sign", "base.saturation", "base.understeer"),
-         ("base.delay", "base.lag_v", "base.lag_w", "base.accel_limit", "base.payload"),
-         ("laser.mount_yaw", "base.marker_yaw"), ("laser.mount_x", "base.marker_x"),
-         ("laser.mount_y", "base.marker_y"), ("laser.scale", "laser.quadratic", "world.map_error", "laser.offset"))
+CONFOUNDED = (
+    ("base.gain_v", "one speed"),
+    ("base.curvature_v", "one speed"),
+    ("base.gain_w", "one side"),
+    ("base.left_right_gain", "one side"),
+    ("base.gain_w", "one speed"),
+    ("base.curvature_w", "one speed"),
+)
+CLASH = (
+    ("base.gain_v", "base.payload", "base.curvature_v", "base.sign", "base.saturation"),
+    ("base.gain_w", "base.payload", "base.curvature_w", "base.sign", "base.saturation", "base.understeer"),
+    ("base.delay", "base.lag_v", "base.lag_w", "base.accel_limit", "base.payload"),
+    ("laser.mount_yaw", "base.marker_yaw"),
+    ("laser.mount_x", "base.marker_x"),
+    ("laser.mount_y", "base.marker_y"),
+    ("laser.scale", "laser.quadratic", "world.map_error", "laser.offset"),
+)
 
 
 class Scene:
@@ -44,8 +64,11 @@ class Scene:
         self.room: Room = draw_room(rng, bool(self.laser and self.laser.rmax < 5))
         self.ref: Reference = draw_reference(rng)
         self.number = int(rng.integers(3, 5))
-        self.unix = 1.7e9 + float(np.round(rng.uniform(0, 6e7), 3)) if rng.random() < 0.4 else \
-            float(np.round(rng.uniform(0, 50), 2))
+        self.unix = (
+            1.7e9 + float(np.round(rng.uniform(0, 6e7), 3))
+            if rng.random() < 0.4
+            else float(np.round(rng.uniform(0, 50), 2))
+        )
         self.hz = float(rng.choice([0.5, 0.7, 1.0]))
         self.columns: list[str] = [c for c in ("temperature", "humidity", "battery") if rng.random() < 0.25]
         if "laser.temperature" in names and "temperature" not in self.columns:
@@ -149,8 +172,14 @@ def make(folder: Path, kind: str, seed: int) -> None:
         for name, rows in tables(dr, s.robot, s.columns, (pairs, scans) if dr is last else None, eff).items():
             files[f"{dr.name}/{name}"] = rows
     scene = f"{s.robot.name}, {s.laser.name if s.laser else 'no laser'}, {s.ref.name} at {s.ref.rate:g} Hz"
-    truth: dict[str, Any] = {"kind": kind, "causes": [], "neutral": NEUTRAL, "unknown": None, "wrong": None,
-                             "sentence": f"{scene}: nothing is hidden"}
+    truth: dict[str, Any] = {
+        "kind": kind,
+        "causes": [],
+        "neutral": NEUTRAL,
+        "unknown": None,
+        "wrong": None,
+        "sentence": f"{scene}: nothing is hidden",
+    }
     truth["neutral"] = [k for k in NEUTRAL if k not in eff]
     if kind == "wrong":
         truth["wrong"] = spoil(rng, files, [d.name for d in drives], bool(s.laser))
@@ -160,14 +189,28 @@ def make(folder: Path, kind: str, seed: int) -> None:
         z, b = what["z"][key]
         p = eff[key]
         part = f" ({('x', 'y', 'heading')[p['part']]})" if "part" in p else ""
-        truth["unknown"] = {"channel": what["channel"], "covariates": [what["of"]], "z": round(z, 2),
-                            "beside": round(b, 2)}
+        truth["unknown"] = {
+            "channel": what["channel"],
+            "covariates": [what["of"]],
+            "z": round(z, 2),
+            "beside": round(b, 2),
+        }
         truth["sentence"] = f"{scene}: {what['channel']}{part} follows {what['of']}"
     elif eff:
         for n, p in eff.items():
             z, b = what["z"][n]
-            truth["causes"].append({"id": n, "z": round(z, 2), "beside": round(b, 2),
-                                    "form": "other" if p["form"] else "usual", "parameters": told(n, p)})
+            truth["causes"].append(
+                {
+                    "id": n,
+                    "z": round(z, 2),
+                    "beside": round(b, 2),
+                    "form": "other" if p["form"] else "usual",
+                    "parameters": told(n, p),
+                }
+            )
         truth["sentence"] = f"{scene}: {', '.join(eff)}" + (f" with {what['way']}" if what["way"] else "")
-    save(folder, {"recording/" + k: v for k, v in files.items()} |
-         {"truth.json": [json.dumps(truth, indent=1)], "answers.csv": lines})
+    save(
+        folder,
+        {"recording/" + k: v for k, v in files.items()}
+        | {"truth.json": [json.dumps(truth, indent=1)], "answers.csv": lines},
+    )

@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Robots, lasers, references and rooms; casting of rays; the texts of model.yaml, meta.yaml and the map."""
+"""Robots, lasers, references and rooms; the casting of rays; the texts of model.yaml and of the map."""
+
+from __future__ import annotations
+
 import re
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kurumaisu.params import shipped
 
-Array = np.ndarray
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+Rng = np.random.Generator
+Segments = tuple[Array, Array, Ints]
+Wall = tuple[str, float, float, float, float, float, str]  # name, x, y, degrees, sizes, colour
 
 
 @dataclass
@@ -30,9 +38,14 @@ class Laser:
     mount: tuple[float, float, float] = (0.2, 0.0, 0.0)
     height: float = 0.4
 
+    @property
+    def bearings(self) -> Array:
+        """Return the beams' bearings in the laser's frame."""
+        return np.asarray(self.angle_min + np.arange(self.n) * self.inc)
+
     def sd(self, r: Array) -> Array:
-        """The noise of a reading of range r."""
-        return self.sigma[0] + self.sigma[1] * r + self.sigma[2] * r * r
+        """Return the noise of readings of ranges r."""
+        return np.asarray(self.sigma[0] + self.sigma[1] * r + self.sigma[2] * r * r)
 
 
 @dataclass
@@ -67,48 +80,64 @@ class Reference:
 class Room:
     """Boxes of a Stage world and where one may drive."""
 
-    walls: list[tuple[str, float, float, float, float, float, str]]
+    walls: list[Wall]
     free: tuple[float, float, float, float]
     boxes: list[tuple[float, float, float]] = field(default_factory=list)
 
 
-def draw_laser(rng: np.random.Generator) -> Laser:
-    """One of the usual scanners, some beams of which were thinned."""
-    d = np.pi / 180
-    k = int(rng.integers(5))
-    if k == 0:
-        s = Laser("URG-04LX", -2.086214, 0.006135923 * 3, 227, 0.1, 9.765625e-5 * 3,
-                  (0.002334, -0.000488, 0.000199), 0.001, 0.06, 4.0, 1.004587)
-    elif k == 1:
-        s = Laser("UTM-30LX", -135 * d, 1.5 * d, 181, 0.025, 0.025 / 240, (0.010, 0.0, 0.0002), 0.001, 0.1, 30.0)
-    elif k == 2:
-        s = Laser("RPLIDAR-A1", -np.pi, 2 * d, 180, 0.18, 0.001, (0.004, 0.003, 0.0005), 0.001, 0.15, 12.0)
-    elif k == 3:
-        s = Laser("LMS-200", -np.pi / 2, d, 181, 0.0267, 0.0133 / 180, (0.005, 0.0005, 0.0), 0.001, 0.1, 8.0)
-    else:
-        s = Laser("LDS-01", -np.pi, 2 * d, 180, 0.2, 0.2 / 180, (0.005, 0.003, 0.001), 0.001, 0.12, 3.5)
-    s.mount = (round(float(rng.uniform(-0.05, 0.3)), 3), round(float(rng.uniform(-0.05, 0.05)), 3), 0.0)
-    return s
+@dataclass
+class Scene:
+    """Robot, laser, room and reference of a case, how many drives there are, and what is recorded beside."""
+
+    robot: Robot
+    laser: Laser | None
+    room: Room
+    ref: Reference
+    number: int
+    unix: float
+    hz: float
+    columns: list[str]
 
 
-def draw_robot(rng: np.random.Generator, volts: bool | None, law: str = "corrected") -> Robot:
-    """A robot; volts: None for any."""
+D = np.pi / 180
+URG = (0.002334, -0.000488, 0.000199)
+LASERS = (  # the usual scanners, some beams of which were thinned
+    Laser("URG-04LX", -2.086214, 0.006135923 * 3, 227, 0.1, 9.765625e-5 * 3, URG, 0.001, 0.06, 4.0, 1.004587),
+    Laser("UTM-30LX", -135 * D, 1.5 * D, 181, 0.025, 0.025 / 240, (0.010, 0.0, 0.0002), 0.001, 0.1, 30.0),
+    Laser("RPLIDAR-A1", -np.pi, 2 * D, 180, 0.18, 0.001, (0.004, 0.003, 0.0005), 0.001, 0.15, 12.0),
+    Laser("LMS-200", -np.pi / 2, D, 181, 0.0267, 0.0133 / 180, (0.005, 0.0005, 0.0), 0.001, 0.1, 8.0),
+    Laser("LDS-01", -np.pi, 2 * D, 180, 0.2, 0.2 / 180, (0.005, 0.003, 0.001), 0.001, 0.12, 3.5),
+)
+ROBOTS = (
+    ("burger", 0.22, 1.4, 0.004, 0.02, "{kind: diff_drive, radius: 0.033, track: 0.16}"),
+    ("kobuki", 0.5, 1.4, 0.007, 0.02, "{kind: diff_drive, radius: 0.035, track: 0.23}"),
+    ("cart", 1.2, 0.9, 0.015, 0.015, "velocity"),
+    ("pioneer", 0.7, 1.2, 0.01, 0.02, "velocity"),
+    ("waffle", 0.26, 1.5, 0.005, 0.02, "velocity"),
+)
+
+
+def draw_laser(rng: Rng) -> Laser:
+    """Draw one of the scanners, and its place."""
+    laser = LASERS[int(rng.integers(5))]
+    x, y = round(float(rng.uniform(-0.05, 0.3)), 3), round(float(rng.uniform(-0.05, 0.05)), 3)
+    return replace(laser, mount=(x, y, 0.0))
+
+
+def draw_robot(rng: Rng, volts: bool | None, law: str) -> Robot:
+    """Draw a robot; volts: None for any."""
     k = int(rng.integers(8))
     if volts or (volts is None and k < 2):
         return Robot("MD-100", 0.8, 1.0, 0.012, 0.02, float(rng.uniform(0.2, 0.5)), "md100", True, law)
     if k < 3:
         return Robot("MD-100 by rates", 0.8, 1.0, 0.012, 0.02, float(rng.uniform(0.2, 0.5)), "md100")
-    kinds = [("burger", 0.22, 1.4, 0.004, 0.02, "{kind: diff_drive, radius: 0.033, track: 0.16}"),
-             ("kobuki", 0.5, 1.4, 0.007, 0.02, "{kind: diff_drive, radius: 0.035, track: 0.23}"),
-             ("cart", 1.2, 0.9, 0.015, 0.015, "velocity"), ("pioneer", 0.7, 1.2, 0.01, 0.02, "velocity"),
-             ("waffle", 0.26, 1.5, 0.005, 0.02, "velocity")]
-    name, v, w, a, b, meta = kinds[int(rng.integers(len(kinds)))]
+    name, v, w, a, b, meta = ROBOTS[int(rng.integers(len(ROBOTS)))]
     f = float(rng.uniform(0.8, 1.3))
     return Robot(name, v, w, a * f, b * f, float(rng.uniform(0.15, 0.6)), meta)
 
 
-def draw_reference(rng: np.random.Generator) -> Reference:
-    """Motion capture, a total station with a prism on either side, or matched scans."""
+def draw_reference(rng: Rng) -> Reference:
+    """Draw motion capture, a total station with a prism on either side, or matched scans."""
     k, u = int(rng.integers(3)), float(rng.uniform(0.8, 1.3))
     if k == 0:
         return Reference("mocap", float(rng.choice([20, 30, 50])), 0.001 * u, 0.002 * u, 0.001, 0.001, 40.0)
@@ -117,36 +146,39 @@ def draw_reference(rng: np.random.Generator) -> Reference:
     return Reference("scan matching", float(rng.choice([2, 5, 10, 20])), 0.008 * u, 0.005 * u, 0.006, 0.003, 30.0)
 
 
-def draw_room(rng: np.random.Generator, small: bool) -> Room:
-    """A room with things along its walls; small: for a laser that does not see far."""
+def draw_room(rng: Rng, small: bool) -> Room:
+    """Draw a room with things along its walls; small: for a laser that does not see far."""
     corridor = rng.random() < 0.25
     lx = float(np.round(rng.uniform(9, 13) if corridor else rng.uniform(5.5, 7 if small else 10), 2))
     ly = float(np.round(rng.uniform(3.2, 4.0) if corridor else rng.uniform(4.8, 6 if small else 8), 2))
-    th, c = 0.1, ["gray30", "tan", "black", "white"]
-    walls = [("south", lx / 2, -th / 2, 0.0, lx + 2 * th, th, "gray30"),
-             ("north", lx / 2, ly + th / 2, 0.0, lx + 2 * th, th, str(rng.choice(c))),
-             ("west", -th / 2, ly / 2, 0.0, th, ly, "gray30"), ("east", lx + th / 2, ly / 2, 0.0, th, ly, "tan")]
-    room = Room([(n, round(x, 4), round(y, 4), a, round(sx, 4), round(sy, 4), q) for n, x, y, a, sx, sy, q in walls],
-                (0.75, lx - 0.75, 0.75, ly - 0.75))
+    th, colours = 0.1, ["gray30", "tan", "black", "white"]
+    walls: list[Wall] = [
+        ("south", lx / 2, -th / 2, 0.0, lx + 2 * th, th, "gray30"),
+        ("north", lx / 2, ly + th / 2, 0.0, lx + 2 * th, th, str(rng.choice(colours))),
+        ("west", -th / 2, ly / 2, 0.0, th, ly, "gray30"),
+        ("east", lx + th / 2, ly / 2, 0.0, th, ly, "tan"),
+    ]
+    walls = [(n, round(x, 4), round(y, 4), a, round(sx, 4), round(sy, 4), q) for n, x, y, a, sx, sy, q in walls]
+    room = Room(walls, (0.75, lx - 0.75, 0.75, ly - 0.75))
     for i in range(int(rng.integers(4, 8))):
         sx, sy = (round(float(rng.uniform(0.3, 0.7)), 2) for _ in range(2))
         side, u = int(rng.integers(4)), float(rng.uniform(0.08, 0.92))
         x, y = [(u * lx, 0.25), (u * lx, ly - 0.25), (0.25, u * ly), (lx - 0.25, u * ly)][side]
         a = round(float(rng.choice([0.0, 0.0, rng.uniform(-45, 45)])), 1)
-        room.walls.append((f"box{i}", round(x, 3), round(y, 3), a, sx, sy, str(rng.choice(c))))
+        room.walls.append((f"box{i}", round(x, 3), round(y, 3), a, sx, sy, str(rng.choice(colours))))
         room.boxes.append((x, y, float(np.hypot(sx, sy)) / 2 + 0.35))
     return room
 
 
 def inside(room: Room, x: Array, y: Array) -> bool:
-    """Whether all of a path can be driven."""
+    """Tell whether all of a path can be driven."""
     a, b, c, d = room.free
     ok = x.min() > a and x.max() < b and y.min() > c and y.max() < d
     return bool(ok and all((np.hypot(x - p, y - q) > r).all() for p, q, r in room.boxes))
 
 
-def segments(room: Room, scale: float = 0.0, moved: Array | None = None) -> tuple[Array, Array, Array]:
-    """Ends (S, 2) of the walls' sides and the wall of each; scale, moved: how the real ones differ from the map."""
+def segments(room: Room, scale: float = 0.0, moved: Array | None = None) -> Segments:
+    """Return both ends (S, 2) of the walls' sides and the wall of each; scale, moved: by what the map is wrong."""
     p, q, k = [], [], []
     for i, (_, x, y, deg, sx, sy, _c) in enumerate(room.walls):
         a = np.radians(deg)
@@ -160,14 +192,14 @@ def segments(room: Room, scale: float = 0.0, moved: Array | None = None) -> tupl
     return np.concatenate(p) * (1 + scale), np.concatenate(q) * (1 + scale), np.concatenate(k)
 
 
-def cast(x: Array, y: Array, phi: Array, segs: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-    """Range, wall and cosine of incidence of each ray, in the shape of x."""
+def cast(x: Array, y: Array, phi: Array, segs: Segments) -> tuple[Array, Ints, Array]:
+    """Return range, wall and cosine of incidence of each ray, in the shape of x."""
     shape = x.shape
     x, y, phi = x.ravel(), y.ravel(), phi.ravel()
     p, q, wall = segs
     e = q - p
-    rng_, hit, cosi = np.empty(x.size), np.empty(x.size, int), np.empty(x.size)
-    ln = np.hypot(e[:, 0], e[:, 1])
+    ranges, hit, cosi = np.empty(x.size), np.empty(x.size, np.int64), np.empty(x.size)
+    length = np.hypot(e[:, 0], e[:, 1])
     for i in range(0, x.size, 4096):
         s = slice(i, i + 4096)
         dx, dy = np.cos(phi[s])[:, None], np.sin(phi[s])[:, None]
@@ -179,30 +211,39 @@ def cast(x: Array, y: Array, phi: Array, segs: tuple[Array, Array, Array]) -> tu
         r[(u < 0) | (u > 1) | (r < 1e-4)] = np.inf
         k = r.argmin(1)
         j = np.arange(k.size)
-        rng_[s], hit[s], cosi[s] = r[j, k], wall[k], abs(det[j, k]) / ln[k]
-    return rng_.reshape(shape), hit.reshape(shape), np.clip(cosi, 0.02, 1).reshape(shape)
+        ranges[s], hit[s], cosi[s] = r[j, k], wall[k], abs(det[j, k]) / length[k]
+    return ranges.reshape(shape), hit.reshape(shape), np.clip(cosi, 0.02, 1).reshape(shape)
 
 
-def world_text(room: Room, pose: tuple[float, float, float]) -> str:
-    """The map as a Stage world."""
+def world_text(room: Room) -> str:
+    """Return the map as a Stage world."""
     out = ['name "room"', "define wall model", "(", '  color "gray30"', "  gui_move 0", ")", ""]
-    out += [f'wall ( name "{n}" pose [{x} {y} 0 {a}] size [{sx} {sy} 1.0] color "{c}" )'
-            for n, x, y, a, sx, sy, c in room.walls]
-    return "\n".join(out) + "\n"
+    for name, x, y, a, sx, sy, colour in room.walls:
+        out.append(f'wall ( name "{name}" pose [{x} {y} 0 {a}] size [{sx} {sy} 1.0] color "{colour}" )')
+    return "\n".join(out)
 
 
 def model_text(robot: Robot, laser: Laser | None) -> str:
-    """model.yaml: the wheelchair's with this robot's law and laser."""
+    """Return model.yaml: the wheelchair's with this robot's law and laser."""
     text = shipped("launch/md100.yaml").read_text(encoding="utf-8")
     new: dict[str, Any] = {"name": robot.name, "voltage_law": robot.law}
     if laser:
         x, y, yaw = laser.mount
-        new |= {"  mount": f"{{x: {x}, y: {y}, z: {laser.height}, yaw: {yaw}}}", "  angle_min": repr(laser.angle_min),
-                "  angle_increment": repr(laser.inc), "  beams": laser.n, "  scan_time": laser.scan_time,
-                "  time_increment": f"{laser.tinc:.9f}", "    scale": laser.scale, "    datum_offset": 0.0,
-                "    sigma": str(list(laser.sigma)), "    resolution": laser.res, "    range_min": laser.rmin,
-                "    range_max": laser.rmax}
+        new |= {
+            "  mount": f"{{x: {x}, y: {y}, z: {laser.height}, yaw: {yaw}}}",
+            "  angle_min": repr(laser.angle_min),
+            "  angle_increment": repr(laser.inc),
+            "  beams": laser.n,
+            "  scan_time": laser.scan_time,
+            "  time_increment": f"{laser.tinc:.9f}",
+            "    scale": laser.scale,
+            "    datum_offset": 0.0,
+            "    sigma": str(list(laser.sigma)),
+            "    resolution": laser.res,
+            "    range_min": laser.rmin,
+            "    range_max": laser.rmax,
+        }
     for key, value in new.items():
         text, n = re.subn(rf"(?m)^{key}:.*$", f"{key}: {value}", text, count=1)
         assert n == 1, key
-    return text
+    return text.rstrip("\n")

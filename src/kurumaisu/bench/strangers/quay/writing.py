@@ -1,12 +1,24 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Queries, answers, and the files of a recording."""
+
 import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kurumaisu.bench.strangers.quay.base import DT, Drive, Effects, growth, mean_path, motion_cov, rates, refer, relative, to_volts
+from kurumaisu.bench.strangers.quay.base import (
+    DT,
+    Drive,
+    Effects,
+    growth,
+    mean_path,
+    motion_cov,
+    rates,
+    refer,
+    relative,
+    to_volts,
+)
 from kurumaisu.bench.strangers.quay.scans import beam_quantity, means, rays, refers
 from kurumaisu.bench.strangers.quay.things import Array, Laser, Reference, Robot, Room, model_text, world_text
 
@@ -29,20 +41,28 @@ def ask(rng: np.random.Generator, dr: Drive) -> tuple[list[tuple[int, int]], lis
         if j >= t.size - 2:
             break
         last = float(t[j])
-        if t[j] - t[i] < 2.6 and not dr.off[i:j + 1].any() and j > i:
+        if t[j] - t[i] < 2.6 and not dr.off[i : j + 1].any() and j > i:
             pairs.append((i, j))
     scans = []
     for s in rng.permutation(len(dr.scan_t)):
         ts = dr.scan_t[s]
         k = int(np.searchsorted(t, ts))
-        near = 0 < k < t.size and t[k] - t[k - 1] < 0.7 and not dr.off[max(k - 2, 0):k + 2].any()
+        near = 0 < k < t.size and t[k] - t[k - 1] < 0.7 and not dr.off[max(k - 2, 0) : k + 2].any()
         if near and all(ts < t[i] - 0.8 or ts > t[j] + 1.0 for i, j in pairs) and len(scans) < 9:
             scans.append(int(s))
     return pairs, sorted(scans)
 
 
-def answers(dr: Drive, robot: Robot, laser: Laser | None, room: Room, ref: Reference, eff: Effects,
-            pairs: list[tuple[int, int]], scans: list[int]) -> Rows:
+def answers(
+    dr: Drive,
+    robot: Robot,
+    laser: Laser | None,
+    room: Room,
+    ref: Reference,
+    eff: Effects,
+    pairs: list[tuple[int, int]],
+    scans: list[int],
+) -> Rows:
     """Rows of answers.csv: what was measured, and what the model without and with the causes says."""
     out = ["run,channel,t0,t1,beam,value,base_mean,base_sd,oracle_mean,oracle_sd"]
     v, _, w = rates(dr, robot, eff, dr.n)
@@ -72,7 +92,7 @@ def _ranges(dr: Drive, robot: Robot, laser: Laser, room: Room, ref: Reference, e
     truth = refer(dr, robot, eff, dr.path, dr.pose_t)
     err = dr.pose - truth
     for s in scans:
-        t = dr.scan_t[s:s + 1]
+        t = dr.scan_t[s : s + 1]
         e = np.array([np.interp(t[0], dr.pose_t[good], err[good, k]) for k in range(3)])
         cols = []
         for which in ({}, eff):
@@ -97,8 +117,9 @@ def _ranges(dr: Drive, robot: Robot, laser: Laser, room: Room, ref: Reference, e
             y = dr.scan[s, b]
             if np.isfinite(y) and max(bm[b], om[b]) < laser.rmax and min(bm[b], om[b]) > laser.rmin:
                 a = stamp(dr, t[0])
-                out.append(f"{dr.name},range,{a},{a},{b}," +
-                           ",".join(f"{x:.6g}" for x in (y, bm[b], bs[b], om[b], os_[b])))
+                out.append(
+                    f"{dr.name},range,{a},{a},{b}," + ",".join(f"{x:.6g}" for x in (y, bm[b], bs[b], om[b], os_[b]))
+                )
     return out
 
 
@@ -121,42 +142,48 @@ def _spread(eff: Effects, laser: Laser, geo: Any, dr: Drive, robot: Robot, room:
     return np.sqrt(sd**2 + step**2 / 12)
 
 
-def tables(dr: Drive, robot: Robot, columns: list[str], query: tuple[list[tuple[int, int]], list[int]] | None,
-           eff: Effects) -> dict[str, Rows]:
+def tables(
+    dr: Drive, robot: Robot, columns: list[str], query: tuple[list[tuple[int, int]], list[int]] | None, eff: Effects
+) -> dict[str, Rows]:
     """The files of a drive, as lines of numbers."""
     files: dict[str, Rows] = {}
     v, w = dr.vc[dr.rows], dr.wc[dr.rows]
     t = [stamp(dr, i * DT) for i in dr.rows]
     if robot.volts:
         f, s = to_volts(robot, v, w)
-        files["voltage.csv"] = ["t,v_f,v_s,v,w"] + [f"{a},{b:.7f},{c:.7f},{d:.4f},{e:.4f}"
-                                                    for a, b, c, d, e in zip(t, f, s, v, w)]
+        files["voltage.csv"] = ["t,v_f,v_s,v,w"] + [
+            f"{a},{b:.7f},{c:.7f},{d:.4f},{e:.4f}" for a, b, c, d, e in zip(t, f, s, v, w)
+        ]
     else:
         files["command.csv"] = ["t,v,w"] + [f"{a},{b:.4f},{c:.4f}" for a, b, c in zip(t, v, w)]
     keep, some = np.ones(dr.pose_t.size, bool), np.ones(len(dr.scan_t), bool)
     if query:
         for i, j in query[0]:
-            keep[i + 1:j + 1] = False
+            keep[i + 1 : j + 1] = False
         some[query[1]] = False
         files["query.csv"] = ["t0,t1"] + [f"{stamp(dr, dr.pose_t[i])},{stamp(dr, dr.pose_t[j])}" for i, j in query[0]]
         files["query.csv"] += [f"{stamp(dr, dr.scan_t[k])},{stamp(dr, dr.scan_t[k])}" for k in query[1]]
     th = np.arctan2(np.sin(dr.pose[:, 2]), np.cos(dr.pose[:, 2]))
-    files["pose.csv"] = ["t,x,y,theta"] + [f"{stamp(dr, dr.pose_t[i])},{dr.pose[i, 0]:.5f},{dr.pose[i, 1]:.5f},"
-                                           f"{th[i]:.6f}" for i in np.flatnonzero(keep)]
+    files["pose.csv"] = ["t,x,y,theta"] + [
+        f"{stamp(dr, dr.pose_t[i])},{dr.pose[i, 0]:.5f},{dr.pose[i, 1]:.5f},{th[i]:.6f}" for i in np.flatnonzero(keep)
+    ]
     if dr.scan.size:
         files["scan.csv"] = ["t," + ",".join(f"r{k}" for k in range(dr.scan.shape[1]))]
-        files["scan.csv"] += [stamp(dr, dr.scan_t[k]) + "," + ",".join(f"{x:.4g}" if x < 1 else f"{x:.3f}"
-                                                                      for x in dr.scan[k])
-                              for k in np.flatnonzero(some)]
+        files["scan.csv"] += [
+            stamp(dr, dr.scan_t[k]) + "," + ",".join(f"{x:.4g}" if x < 1 else f"{x:.3f}" for x in dr.scan[k])
+            for k in np.flatnonzero(some)
+        ]
     if columns:
         g = dr.cov_t
         files["covariate.csv"] = ["t," + ",".join(columns)] + [
-            stamp(dr, g[k]) + "," + ",".join(f"{dr.cov[c][k]:.3f}" for c in columns) for k in range(g.size)]
+            stamp(dr, g[k]) + "," + ",".join(f"{dr.cov[c][k]:.3f}" for c in columns) for k in range(g.size)
+        ]
     return files
 
 
-def setting(robot: Robot, laser: Laser | None, room: Room, ref: Reference, drives: list[Drive],
-            said: bool) -> dict[str, Rows]:
+def setting(
+    robot: Robot, laser: Laser | None, room: Room, ref: Reference, drives: list[Drive], said: bool
+) -> dict[str, Rows]:
     """meta.yaml, model.yaml and the map."""
     names = [d.name for d in drives]
     meta = ["model: model.yaml", f"robot: {robot.meta}", f"train: [{', '.join(names[:-1])}]", f"test: [{names[-1]}]"]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Data that are wrong as a whole."""
+
 import re
 from collections.abc import Callable
 
@@ -76,8 +77,9 @@ def spoil(rng: np.random.Generator, files: Files, runs: list[str], laser: bool) 
         for k, (r, _) in enumerate(parts):
             rows = parts[(k + 1) % len(parts)][1]
             t0, own = float(rows[1].split(",")[0]), float(parts[k][1][1].split(",")[0])
-            files[f"{r}/{asked}"] = rows[:1] + [f"{float(x.split(',')[0]) - t0 + own:.6f}," + x.split(",", 1)[1]
-                                                for x in rows[1:]]
+            files[f"{r}/{asked}"] = rows[:1] + [
+                f"{float(x.split(',')[0]) - t0 + own:.6f}," + x.split(",", 1)[1] for x in rows[1:]
+            ]
         return "the poses are of another drive than the commands"
     if way == "twice":
         for name in [k for k in files if k.startswith(runs[0] + "/")]:
