@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kurumaisu.bench.strangers.quay.base import Cause
-from kurumaisu.bench.strangers.quay.things import Array, Laser, Rng, Robot, Scene
+from kurumaisu.bench.strangers.quay.things import Array, Rng, Robot, Scene
 
 # Name, marks, usual sizes. Marks: u needs voltages, = has one form only, + sizes have one sign, ~ likewise and shows in
 # the scatter of readings, ? has parameters that are not told, . none.
@@ -53,9 +53,12 @@ class Draw(NamedTuple):
 
     f: float
     rng: Rng
-    robot: Robot
-    laser: Laser | None
     scene: Scene
+
+    @property
+    def robot(self) -> Robot:
+        """Return the robot."""
+        return self.scene.robot
 
     @property
     def slow(self) -> float:
@@ -90,8 +93,8 @@ def _dropout(p: Cause, c: Draw) -> Cause:
 
 
 def _laser_saturation(p: Cause, c: Draw) -> Cause:
-    assert c.laser
-    far = min(c.laser.rmax, c.scene.room.free[1] + 0.75)
+    assert c.scene.laser
+    far = min(c.scene.laser.rmax, c.scene.room.free[1] + 0.75)
     return {"inverse_far": round(1 / (far * max(0.75 - 0.1 * c.f, 0.3)), 5), "lost": int(c.rng.random() < 0.5)}
 
 
@@ -101,11 +104,12 @@ def _crosstalk(p: Cause, c: Draw) -> Cause:
 
 
 def _beam_bias(p: Cause, c: Draw) -> Cause:
-    assert c.laser
+    laser = c.scene.laser
+    assert laser
     if c.rng.random() < 0.5:
-        return {"each": c.rng.standard_normal(c.laser.n) * p["sd"]}
+        return {"each": c.rng.standard_normal(laser.n) * p["sd"]}
     phase = round(float(c.rng.uniform(-3, 3)), 3)
-    return {"each": p["sd"] * np.sin((2 if p["form"] else 1) * c.laser.bearings + phase)}
+    return {"each": p["sd"] * np.sin((2 if p["form"] else 1) * laser.bearings + phase)}
 
 
 def _map_error(p: Cause, c: Draw) -> Cause:
@@ -123,10 +127,7 @@ FINISH: dict[str, Callable[[Cause, Draw], Cause]] = {
     "base.veer": lambda p, c: {"curvature": round(c.f * 0.04 / c.slow, 5)},
     "base.curvature_v": lambda p, c: {"curvature": round(min(c.f * 0.1, 0.5) / c.slow, 5)},
     "base.saturation": _base_saturation,
-    "base.accel_limit": lambda p, c: {
-        "slowness_v": round(c.f * 1.2 / c.slow, 5),
-        "slowness_w": round(c.f * 0.6, 5),
-    },
+    "base.accel_limit": lambda p, c: {"slowness_v": round(c.f * 1.2 / c.slow, 5), "slowness_w": round(c.f * 0.6, 5)},
     "base.understeer": lambda p, c: {"k": round(c.f * 0.25 / c.slow**2, 5)},
     "base.slope": _slope,
     "base.caster_reversal": lambda p, c: {"length": round(float(c.rng.uniform(0.15, 0.4)) * max(c.slow, 0.5), 3)},
@@ -156,7 +157,7 @@ def draw(name: str, rng: Rng, scale: float, form: bool, scene: Scene, typical: b
     p: Cause = {"form": form and name not in PLAIN}
     p |= {key: round(value * f, 5) for key, value in SIZES[name].items()}
     if name in FINISH:
-        p |= FINISH[name](p, Draw(f, rng, scene.robot, scene.laser, scene))
+        p |= FINISH[name](p, Draw(f, rng, scene))
     return {key: value for key, value in p.items() if value is not None}
 
 
@@ -188,7 +189,7 @@ def draw_unknown(rng: Rng, scale: float) -> tuple[str, str, str, Cause]:
         if of == "comes":  # and goes
             return np.asarray((np.sin(2 * np.pi * x * (4 + 2 * a) + b) > 0.75) * 1.0)
         if of in ("direction", "bearing", "heading"):
-            return np.sin(np.pi * x * round(a) + b)
+            return np.asarray(np.sin(np.pi * x * round(a) + b))
         return np.asarray(np.sin(a * x + b) if b > 3 else np.tanh(4 * (x - 0.5)) * 0.7)
 
     size = {"v": 0.1, "w": 0.1, "range": 0.012, "spread": 0.7}.get(part, 0.0)

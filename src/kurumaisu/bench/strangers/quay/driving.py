@@ -161,4 +161,4 @@ def measure(rng: Rng, dr: Drive, scene: Scene, eff: Effects) -> None:
 def scan_times(rng: Rng, dr: Drive, hz: float) -> None:
     """Enter the stamps of scans, with jitter, between the first and the last row of the reference."""
     t = np.arange(1.0, dr.n * DT - 1.5, 1 / hz)
-    dr.scan_t = np.round(t + rng.uniform(-0.05, 0.05, t.size), 6)
+    dr.scan_t = np.asarray(np.round(t + rng.uniform(-0.05, 0.05, t.size), 6), dtype=np.float64)

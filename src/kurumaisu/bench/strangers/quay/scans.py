@@ -125,9 +125,9 @@ def _quantity(name: str, g: View) -> Array:
     if name == "direction":
         return np.asarray(np.arctan2(np.sin(g.phi), np.cos(g.phi)) / np.pi)
     if name == "hit_x":
-        return 2 * (g.x + g.r * np.cos(g.phi)) / a - 1
+        return np.asarray(2 * (g.x + g.r * np.cos(g.phi)) / a - 1)
     if name == "hit_y":
-        return 2 * (g.y + g.r * np.sin(g.phi)) / b - 1
+        return np.asarray(2 * (g.y + g.r * np.sin(g.phi)) / b - 1)
     dr = g.dr
     q = quantity(dr, g.scene.robot, name, dr.path[:-1], dr.vc, dr.wc)
     return np.broadcast_to(np.interp(g.t, np.arange(dr.n) * DT, q)[:, None], g.r.shape)

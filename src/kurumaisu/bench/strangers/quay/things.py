@@ -229,20 +229,11 @@ def model_text(robot: Robot, laser: Laser | None) -> str:
     new: dict[str, Any] = {"name": robot.name, "voltage_law": robot.law}
     if laser:
         x, y, yaw = laser.mount
-        new |= {
-            "  mount": f"{{x: {x}, y: {y}, z: {laser.height}, yaw: {yaw}}}",
-            "  angle_min": repr(laser.angle_min),
-            "  angle_increment": repr(laser.inc),
-            "  beams": laser.n,
-            "  scan_time": laser.scan_time,
-            "  time_increment": f"{laser.tinc:.9f}",
-            "    scale": laser.scale,
-            "    datum_offset": 0.0,
-            "    sigma": str(list(laser.sigma)),
-            "    resolution": laser.res,
-            "    range_min": laser.rmin,
-            "    range_max": laser.rmax,
-        }
+        new["  mount"] = f"{{x: {x}, y: {y}, z: {laser.height}, yaw: {yaw}}}"
+        new |= {"  angle_min": repr(laser.angle_min), "  angle_increment": repr(laser.inc), "  beams": laser.n}
+        new |= {"  scan_time": laser.scan_time, "  time_increment": f"{laser.tinc:.9f}", "    scale": laser.scale}
+        new |= {"    datum_offset": 0.0, "    sigma": list(laser.sigma), "    resolution": laser.res}
+        new |= {"    range_min": laser.rmin, "    range_max": laser.rmax}
     for key, value in new.items():
         text, n = re.subn(rf"(?m)^{key}:.*$", f"{key}: {value}", text, count=1)
         assert n == 1, key

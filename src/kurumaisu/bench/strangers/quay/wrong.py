@@ -1,105 +1,105 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Data that are wrong as a whole."""
 
+from __future__ import annotations
+
 import re
 from collections.abc import Callable
 
 import numpy as np
 
+from kurumaisu.bench.strangers.quay.things import Rng
+
 Files = dict[str, list[str]]
+Change = Callable[[float], float]
+ALWAYS = ("mm", "deg", "sign_x", "sign_w", "swap", "clockwise", "ms", "clock", "other", "twice")
+WITH_LASER = ("range_mm", "map_mirror", "fan", "map", "scan_clock")
 
 
-def _column(files: Files, suffix: str, name: str, f: Callable[[float], float]) -> None:
-    """Change a column of all files of a name; names that end in * stand for all that begin so."""
+def _thousandfold(x: float) -> float:
+    return x * 1000
+
+
+def _negative(x: float) -> float:
+    return -x
+
+
+COLUMNS: dict[str, tuple[str, tuple[str, ...], Change, str]] = {  # way: file, columns, change, sentence
+    "mm": ("pose.csv", ("x", "y"), _thousandfold, "positions of the reference are in mm"),
+    "deg": ("pose.csv", ("theta",), np.degrees, "headings of the reference are in degrees"),
+    "sign_x": ("pose.csv", ("x",), _negative, "x of the reference has the wrong sign"),
+    "sign_w": ("asked", ("v_s", "w"), _negative, "the yaw rates asked for have the wrong sign"),
+    "clockwise": ("pose.csv", ("theta",), _negative, "headings of the reference are clockwise"),
+    "ms": ("", ("t", "t0", "t1"), _thousandfold, "all stamps are in ms"),
+    "range_mm": ("scan.csv", ("r",), _thousandfold, "ranges are in mm"),
+}
+
+
+def _rewrite(files: Files, suffix: str, row: Callable[[list[str], list[str]], list[str]]) -> None:
+    """Rewrite the rows of all tables of a name, of any name if it is empty; row: by header and cells."""
     for path, rows in files.items():
-        if not path.endswith("/" + suffix):
-            continue
-        head = rows[0].split(",")
-        at = [i for i, h in enumerate(head) if h == name or (name[-1] == "*" and h.startswith(name[:-1]))]
-        for k in range(1, len(rows)):
-            c = rows[k].split(",")
-            for i in at:
-                c[i] = f"{f(float(c[i])):.6f}".rstrip("0").rstrip(".") if name != "r*" else f"{f(float(c[i])):.4f}"
-            rows[k] = ",".join(c)
-
-
-def _swap(files: Files, suffix: str, a: str, b: str) -> None:
-    for path, rows in files.items():
-        if path.endswith("/" + suffix):
+        if path.endswith(suffix) and path.endswith(".csv"):
             head = rows[0].split(",")
-            i, j = head.index(a), head.index(b)
-            for k in range(1, len(rows)):
-                c = rows[k].split(",")
-                c[i], c[j] = c[j], c[i]
-                rows[k] = ",".join(c)
+            rows[1:] = [",".join(row(head, r.split(","))) for r in rows[1:]]
 
 
-def spoil(rng: np.random.Generator, files: Files, runs: list[str], laser: bool) -> str:
-    """Make the files wrong in one way; the sentence that says which."""
-    volts = any(k.endswith("voltage.csv") for k in files)
-    ways = ["mm", "deg", "sign_x", "sign_w", "swap", "clockwise", "ms", "clock", "other", "twice"]
-    ways += ["range_mm", "map_mirror", "fan", "map", "scan_clock"] if laser else []
+def _change(files: Files, suffix: str, columns: tuple[str, ...], f: Change) -> None:
+    """Change columns; r stands for those of all beams."""
+
+    def cell(name: str, text: str) -> str:
+        if name in columns:
+            return f"{f(float(text)):.6f}".rstrip("0").rstrip(".")
+        return f"{f(float(text)):.4f}" if name[0] == "r" and "r" in columns else text
+
+    _rewrite(files, suffix, lambda head, cells: [cell(n, c) for n, c in zip(head, cells, strict=True)])
+
+
+def _shift_rows(files: Files, names: list[str]) -> None:
+    """Give each file the rows of the next, from its own first stamp on."""
+    rows = [files[name] for name in names]
+    for name, own, new in zip(names, rows, rows[1:] + rows[:1], strict=True):
+        t0, start = float(new[1].split(",")[0]), float(own[1].split(",")[0])
+        cells = [row.split(",", 1) for row in new[1:]]
+        files[name] = new[:1] + [f"{float(t) - t0 + start:.6f},{rest}" for t, rest in cells]
+
+
+def _new_map(files: Files, mirrored: bool) -> None:
+    def place(m: re.Match[str]) -> str:
+        x, y, a = float(m[1]), float(m[2]), float(m[3])
+        if mirrored:
+            return f"pose [{-x} {y} 0 {-a}]"
+        return f"pose [{round(0.55 * y + 0.9 * x + 0.7, 3)} {round(1.3 * y - 0.2 * x - 0.5, 3)} 0 {a + 20}]"
+
+    text = "\n".join(files["room.world"])
+    files["room.world"] = re.sub(r"pose \[(\S+) (\S+) 0 (\S+)\]", place, text).split("\n")
+
+
+def spoil(rng: Rng, files: Files, runs: list[str], laser: bool) -> str:
+    """Make the files wrong in one way; return the sentence that says which."""
+    ways = ALWAYS + WITH_LASER if laser else ALWAYS
     way = ways[int(rng.integers(len(ways)))]
-    asked = "voltage.csv" if volts else "command.csv"
-    if way == "mm":
-        for c in "xy":
-            _column(files, "pose.csv", c, lambda x: x * 1000)
-        return "positions of the reference are in mm"
-    if way == "deg":
-        _column(files, "pose.csv", "theta", np.degrees)
-        return "headings of the reference are in degrees"
-    if way == "sign_x":
-        _column(files, "pose.csv", "x", lambda x: -x)
-        return "x of the reference has the wrong sign"
-    if way == "sign_w":
-        _column(files, asked, "v_s" if volts else "w", lambda x: -x)
-        if volts:
-            _column(files, asked, "w", lambda x: -x)
-        return "the yaw rates asked for have the wrong sign"
+    asked = "voltage.csv" if any(k.endswith("voltage.csv") for k in files) else "command.csv"
+    if way in COLUMNS:
+        name, columns, change, sentence = COLUMNS[way]
+        _change(files, asked if name == "asked" else name, columns, change)
+        return sentence
     if way == "swap":
-        _swap(files, "pose.csv", "x", "y")
+        _rewrite(files, "pose.csv", lambda head, cells: [cells[0], cells[2], cells[1], *cells[3:]])
         return "x and y of the reference are swapped"
-    if way == "clockwise":
-        _column(files, "pose.csv", "theta", lambda x: -x)
-        return "headings of the reference are clockwise"
-    if way == "ms":
-        for c in ("t", "t0", "t1"):
-            for name in (asked, "pose.csv", "scan.csv", "covariate.csv", "query.csv"):
-                _column(files, name, c, lambda x: x * 1000)
-        return "all stamps are in ms"
     if way in ("clock", "scan_clock"):
         d = float(rng.uniform(2.5, 6)) * (1 if rng.random() < 0.5 else -1)
         name = asked if way == "clock" else "scan.csv"
-        _column(files, name, "t", lambda x: x + d)
+        _change(files, name, ("t",), lambda x: x + d)
         return f"the clock of {name} is {d:.1f} s off"
     if way == "other":
-        parts = [(r, files[f"{r}/{asked}"]) for r in runs]
-        for k, (r, _) in enumerate(parts):
-            rows = parts[(k + 1) % len(parts)][1]
-            t0, own = float(rows[1].split(",")[0]), float(parts[k][1][1].split(",")[0])
-            files[f"{r}/{asked}"] = rows[:1] + [
-                f"{float(x.split(',')[0]) - t0 + own:.6f}," + x.split(",", 1)[1] for x in rows[1:]
-            ]
+        _shift_rows(files, [f"{run}/{asked}" for run in runs])
         return "the poses are of another drive than the commands"
     if way == "twice":
         for name in [k for k in files if k.startswith(runs[0] + "/")]:
             files[name.replace(runs[0], runs[1])] = list(files[name])
         return "a drive is given twice, under two names"
-    if way == "range_mm":
-        _column(files, "scan.csv", "r*", lambda x: x * 1000)
-        return "ranges are in mm"
     if way == "fan":
-        for path, rows in files.items():
-            if path.endswith("scan.csv"):
-                rows[1:] = [",".join([r.split(",")[0], *r.split(",")[:0:-1]]) for r in rows[1:]]
+        _rewrite(files, "scan.csv", lambda head, cells: [cells[0], *cells[:0:-1]])
         return "the fan is mirrored: beams come in the other order"
-    text = "\n".join(files["room.world"])
-
-    def place(m: re.Match[str]) -> str:
-        x, y, a = float(m[1]), float(m[2]), float(m[3])
-        if way == "map_mirror":
-            return f"pose [{-x} {y} 0 {-a}]"
-        return f"pose [{round(0.55 * y + 0.9 * x + 0.7, 3)} {round(1.3 * y - 0.2 * x - 0.5, 3)} 0 {a + 20}]"
-
-    files["room.world"] = re.sub(r"pose \[(\S+) (\S+) 0 (\S+)\]", place, text).split("\n")
+    _new_map(files, way == "map_mirror")
     return "the map is mirrored" if way == "map_mirror" else "the map is another room's"
