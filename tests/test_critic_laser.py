@@ -12,7 +12,7 @@ from laser_scene import neighbours, recording
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise, Stacked, whitened
+from kurumaisu.critic.ranges.noise.shared_errors import Gram, Grams, Layout, ScanNoise, Stacked, whitened
 from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.repeatability import repeatability
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch, confusion
@@ -80,8 +80,8 @@ def test_dependent_noise_does_not_pass_for_an_effect_on_the_mean(tmp_path, seed)
     assert normal.beam_noise.rho == pytest.approx(0.5, abs=0.05)
     assert normal.scan_noise.position_sd == pytest.approx(0.005, rel=0.4)
     assert normal.scan_noise.heading_sd == pytest.approx(0.005, rel=0.4)
-    naive = [gram.matrix[gram.own + gram.shared :, gram.own + gram.shared :] for gram in assembly.grams(assembly.first)]
-    assert FormSearch(assembly.forms, np.sum(naive, axis=0)).run().named
+    naive = assembly.grams(assembly.first).common
+    assert FormSearch(assembly.forms, naive).run().named
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_normal_equations_are_those_of_the_dense_covariance():
         rows = whitened(np.hstack([poses[k], np.ones((beams, 1)), columns[k]]), valid, sd, rho)
         grams.append(Gram(rows.T @ rows, own, 1))
     layout = Layout(times, run, np.full(scans, -1))
-    gram, log_det = Stacked(grams, layout).marginal(noise)
+    gram, log_det = Stacked(Grams.summed(grams), layout).marginal(noise)
     same = run[:, None] == run[None, :]
     modes = noise.common_sd**2 * np.exp(-np.abs(times[:, None] - times) / noise.common_tau) * same
     n = len(at)
@@ -175,7 +175,7 @@ def test_errors_that_last_and_those_of_stands_are_those_of_the_dense_covariance(
             np.hstack([own, np.ones((beams, 1)), poses[k], columns[k]]), np.full(beams, True), np.ones(beams), 0
         )
         grams.append(Gram(rows.T @ rows, own.shape[1], 4))
-    gram, log_det = Stacked(grams, Layout(times, run, stand)).marginal(noise)
+    gram, log_det = Stacked(Grams.summed(grams), Layout(times, run, stand)).marginal(noise)
     apart, same = np.abs(times[:, None] - times), run[:, None] == run[None, :]
     dense = np.kron(noise.common_sd**2 * np.exp(-apart / noise.common_tau) * same, np.ones((beams, beams)))
     dense += np.eye(scans * beams)

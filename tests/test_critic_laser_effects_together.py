@@ -7,7 +7,7 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.critic.judge.scan_verdict import size_of
 from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, common_mode, estimate
-from kurumaisu.critic.ranges.noise.shared_errors import Gram, Layout, ScanNoise
+from kurumaisu.critic.ranges.noise.shared_errors import Gram, Grams, Layout, ScanNoise
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
 from kurumaisu.critic.scatter.common_offset import beyond_own_offset, own_sd, with_common_offset
@@ -156,7 +156,7 @@ def _scans(common, seed, scans=250, readings=400, sd=0.004):
         rows = np.column_stack([np.ones(readings), common * mode[k] + sd * rng.standard_normal(readings)]) / sd
         grams.append(Gram(rows.T @ rows, 0, 1))
     nowhere = np.full(scans, -1)
-    return grams, Layout(0.1 * np.arange(scans), np.zeros(scans, dtype=int), nowhere)
+    return Grams.summed(grams), Layout(0.1 * np.arange(scans), np.zeros(scans, dtype=int), nowhere)
 
 
 def _weighed(common, seed, own=0.0):

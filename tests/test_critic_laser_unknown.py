@@ -16,6 +16,7 @@ from kurumaisu.critic.base.covariates import with_past
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
+    Grams,
     Layout,
     OffsetProducts,
     ScanNoise,
@@ -202,7 +203,7 @@ def test_beams_that_keep_an_offset_are_integrated_out():
         parts.append(products[:, : own + 1])
         total += products[:, own + 1 :]
     layout = Layout(times, run, np.full(scans, -1))
-    gram = without_beam_offsets(grams, OffsetProducts(tuple(parts), total, inner), layout, noise, sd_own)
+    gram = without_beam_offsets(Grams.summed(grams), OffsetProducts(tuple(parts), total, inner), layout, noise, sd_own)
     modes = noise.common_sd**2 * np.exp(-np.abs(times[:, None] - times) / noise.common_tau)
     dense = np.kron(modes * (run[:, None] == run), np.ones((n, n)))
     dense += np.kron(np.ones((scans, scans)), sd_own**2 * np.eye(n))

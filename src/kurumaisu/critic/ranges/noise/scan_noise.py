@@ -7,13 +7,12 @@ so many independent ones makes a critic certain of effects that are not there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
-from kurumaisu.critic.ranges.noise.shared_errors import FLOOR, Gram, Layout, ScanNoise, Stacked
+from kurumaisu.critic.ranges.noise.shared_errors import FLOOR, Grams, Layout, ScanNoise, Stacked
 from kurumaisu.types import FloatArray, IntArray
 
 # Of position [m], heading [rad], common mode [m], its time constant [s], how large errors of positions that last are,
@@ -58,15 +57,14 @@ class CommonMode:
 class _Likelihood:
     """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
 
-    def __init__(self, grams: Sequence[Gram], layout: Layout, project: IntArray) -> None:
+    def __init__(self, grams: Grams, layout: Layout, project: IntArray) -> None:
         """Take common columns to project out; the last common column is the residual."""
-        chosen = [_only(gram, project) for gram in grams]
+        chosen = grams.only(project)
         self._stacked = Stacked(chosen, layout)
         # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
         # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
         # more noise.
-        each = sum(np.diag(gram.matrix)[gram.own + gram.shared : -1] for gram in chosen)
-        self._norms = np.sqrt(np.maximum(each, 1e-300))
+        self._norms = np.sqrt(np.maximum(np.diag(chosen.common)[:-1], 1e-300))
 
     def __call__(self, noise: ScanNoise) -> float:
         s, log_det = self._stacked.marginal(noise)
@@ -77,7 +75,7 @@ class _Likelihood:
         return 0.5 * (log_det + yy - fitted + float(np.linalg.slogdet(x)[1]))
 
 
-def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
+def estimate(grams: Grams, layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
     """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
 
     The last common column is the residual. truth: sds of the reference as somebody says, if anybody does.
@@ -97,7 +95,7 @@ def estimate(grams: Sequence[Gram], layout: Layout, truth: tuple[float, float] |
 
 
 def beyond_stated(
-    grams: Sequence[Gram], layout: Layout, truth: tuple[float, float], project: IntArray, noise: ScanNoise
+    grams: Grams, layout: Layout, truth: tuple[float, float], project: IntArray, noise: ScanNoise
 ) -> float:
     """Return what says [nat] that a reference errs by more, or longer, than is said, by all its scans; as of estimate.
 
@@ -112,7 +110,7 @@ def beyond_stated(
     return likelihood(noise) - likelihood(free) - 0.5 * float(far @ far)
 
 
-def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+def with_lasting_common_mode(grams: Grams, layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
     """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
 
     The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
@@ -139,7 +137,7 @@ def with_lasting_common_mode(grams: Sequence[Gram], layout: Layout, project: Int
 
 
 def common_mode(
-    grams: Sequence[Gram],
+    grams: Grams,
     layout: Layout,
     truth: tuple[float, float] | None,
     project: IntArray,
@@ -221,10 +219,3 @@ def _likeliest(
         options = {"xatol": 0.05, "fatol": 0.05, "maxfev": 25 * len(at), "initial_simplex": simplex}
         at = minimize(cost, at, method="Nelder-Mead", options=options).x
     return noise_at(at)
-
-
-def _only(gram: Gram, project: IntArray) -> Gram:
-    """Return a gram with some of the common columns, and the last, which is the residual."""
-    lead = gram.own + gram.shared
-    keep = np.concatenate([np.arange(lead), lead + project, [len(gram.matrix) - 1]])
-    return Gram(gram.matrix[np.ix_(keep, keep)], gram.own, gram.shared)

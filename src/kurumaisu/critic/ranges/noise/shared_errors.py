@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -85,12 +85,48 @@ class Gram:
 
     own: number of leading columns, for the errors of its own reference poses, x, y, yaw in turn; shared: of those that
     follow, one for its common mode and three for the error of its stand's pose or, where asked for, for what lasts of
-    its poses' errors; the rest are common to all scans.
+    its poses' errors; the rest are common to all scans. matrix (m, m), or its rows of own and shared columns alone.
     """
 
     matrix: FloatArray
     own: int
     shared: int
+
+    @property
+    def lead(self) -> int:
+        """Return the number of columns that are not common to all scans."""
+        return self.own + self.shared
+
+
+@dataclass(frozen=True)
+class Grams:
+    """Normal equations of scans: of each the rows that are its own or shared; common (c, c): of all, the rest added up.
+
+    The rest of each would be most of the memory, and nobody asks for it.
+    """
+
+    leads: tuple[Gram, ...]
+    common: FloatArray
+
+    @classmethod
+    def summed(cls, grams: Iterable[Gram]) -> Grams:
+        """Return those of some scans, of which one must be known as a whole at a time."""
+        leads: list[Gram] = []
+        common = np.empty((0, 0))
+        for gram in grams:
+            rest = gram.matrix[gram.lead :, gram.lead :]
+            common = common if leads else np.zeros_like(rest)
+            common += rest
+            leads.append(replace(gram, matrix=gram.matrix[: gram.lead].copy()))
+        return cls(tuple(leads), common)
+
+    def only(self, columns: IntArray) -> Grams:
+        """Return them with some of the common columns, and the last, which is the residual."""
+        own = np.r_[columns, len(self.common) - 1]
+        leads = (
+            replace(gram, matrix=gram.matrix[:, np.r_[np.arange(gram.lead), gram.lead + own]]) for gram in self.leads
+        )
+        return Grams(tuple(leads), self.common[np.ix_(own, own)])
 
 
 def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) -> FloatArray:
@@ -109,14 +145,13 @@ def whitened(columns: FloatArray, valid: BoolArray, sd: FloatArray, rho: float) 
 class Stacked:
     """Grams in a few large arrays, for noises to be tried on."""
 
-    def __init__(self, grams: Sequence[Gram], layout: Layout) -> None:
-        self._layout = layout
-        self._common = len(grams[0].matrix) - grams[0].own - grams[0].shared
+    def __init__(self, grams: Grams, layout: Layout) -> None:
+        self._layout, self._common = layout, grams.common
         groups: dict[tuple[int, int], list[int]] = {}
-        for k, gram in enumerate(grams):
+        for k, gram in enumerate(grams.leads):
             groups.setdefault((gram.own, gram.shared), []).append(k)
         self._parts = [
-            _Part(np.array([grams[k].matrix for k in rows]), own, shared, layout.index(np.array(rows), shared))
+            _Part(np.array([grams.leads[k].matrix for k in rows]), own, layout.index(np.array(rows), shared))
             for (own, shared), rows in groups.items()
         ]
 
@@ -126,11 +161,12 @@ class Stacked:
         The latter is that of the covariance, relative to independent readings.
         """
         band, prior_log_det = precision(self._layout, noise)
-        cross, total, log_det = np.zeros((band.shape[1], self._common)), np.zeros((self._common, self._common)), 0.0
+        total, log_det = self._common.copy(), 0.0
+        cross = np.zeros((band.shape[1], len(total)))
         for part in self._parts:
-            within, beside, rest, more = part.without_own(own_pose_sds(noise))
+            within, beside, less, more = part.without_own(own_pose_sds(noise))
             log_det += more
-            total += rest
+            total -= less
             band += banded(part.index, within, band.shape)
             cross += gathered(part.index, beside, band.shape[1])
         factor = cholesky_banded(band, lower=True)
@@ -153,24 +189,23 @@ def gathered(index: IntArray, parts: FloatArray, count: int) -> FloatArray:
 
 
 class _Part:
-    """Grams (n, m, m) of the same parts; index (n, shared): of which errors that scans share each has its own."""
+    """Rows (n, lead, m) of alike grams; index (n, shared): of which errors that scans share each has its own."""
 
-    def __init__(self, matrices: FloatArray, own: int, shared: int, index: IntArray) -> None:
-        lead = own + shared
+    def __init__(self, matrices: FloatArray, own: int, index: IntArray) -> None:
+        lead = matrices.shape[1]
         self.index = index
         self._own, self._outer = matrices[:, :own, :own], np.ascontiguousarray(matrices[:, :own, own:])
-        self._within, self._beside = matrices[:, own:lead, own:lead], matrices[:, own:lead, lead:]
-        self._rest = matrices[:, lead:, lead:].sum(axis=0)
+        self._within, self._beside = matrices[:, own:, own:lead], matrices[:, own:, lead:]
 
     def without_own(self, size: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
         """Return parts of the grams when errors of sds size (3,) of their own poses are integrated out.
 
-        (n, shared, shared) within what is shared, (n, shared, c) beside the common columns, (c, c) of these, and a log
-        determinant.
+        (n, shared, shared) within what is shared, (n, shared, c) beside the common columns; by how much those of these
+        (c, c) are less; and a log determinant.
         """
         own, shared = self._own.shape[1], self.index.shape[1]
         if own == 0:
-            return self._within, self._beside, self._rest, 0.0
+            return self._within, self._beside, np.zeros(2 * self._beside.shape[2:]), 0.0
         scale = np.tile(size, own // 3)
         inner = self._own * np.outer(scale, scale) + np.eye(own)
         lower = np.linalg.cholesky(inner)
@@ -181,7 +216,7 @@ class _Part:
         return (
             self._within - lead @ root[:, :, :shared],
             self._beside - lead @ common,
-            self._rest - flat.T @ flat,
+            flat.T @ flat,
             log_det,
         )
 
@@ -280,7 +315,7 @@ def offset_products(rows: FloatArray, valid: BoolArray, sd: FloatArray, rho: flo
 
 
 def without_beam_offsets(
-    grams: Sequence[Gram], cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
+    grams: Grams, cross: OffsetProducts, layout: Layout, noise: ScanNoise, beam_sd: float
 ) -> FloatArray:
     """Return normal equations as Stacked.marginal does, offsets of beams of sd beam_sd [m] integrated out too.
 
@@ -288,25 +323,24 @@ def without_beam_offsets(
     """
     size, beams = own_pose_sds(noise), len(cross.inner)
     outer = cross.common.copy()
-    inner, total = cross.inner + max(beam_sd, _FLOOR) ** -2 * np.eye(beams), np.zeros((outer.shape[1], outer.shape[1]))
+    inner, total = cross.inner + max(beam_sd, _FLOOR) ** -2 * np.eye(beams), grams.common.copy()
     taken: list[tuple[FloatArray, FloatArray]] = []
     within, beside = [], []  # of the errors that scans share, and beside them: beams' offsets, then the common columns
-    for k, gram in enumerate(grams):
-        own, lead = gram.own, gram.own + gram.shared
-        rest, offsets = gram.matrix[own:lead, own:], cross.own[k][:, own:]
+    for k, gram in enumerate(grams.leads):
+        own = gram.own
+        rest, offsets = gram.matrix[own:, own:], cross.own[k][:, own:]
         if own:
             part, columns = _of_own(gram, cross.own[k], size)
             rest, offsets = rest - columns[:, : gram.shared].T @ columns, offsets - part.T @ columns[:, : gram.shared]
             taken.append((part, columns[:, gram.shared :]))
         within.append(rest[:, : gram.shared])
         beside.append(np.hstack([offsets.T, rest[:, gram.shared :]]))
-        total += gram.matrix[lead:, lead:]
     if taken:  # all at once: one product of large matrices instead of many of small ones
         parts, columns = (np.concatenate(each) for each in zip(*taken, strict=True))
         inner -= parts.T @ parts
         outer -= parts.T @ columns
         total -= columns.T @ columns
-    index = layout.index(np.arange(len(grams)), len(within[0]))
+    index = layout.index(np.arange(len(within)), len(within[0]))
     band = precision(layout, noise)[0]
     factor = cholesky_banded(band + banded(index, np.array(within), band.shape), lower=True)
     every = gathered(index, np.array(beside), band.shape[1])

@@ -20,6 +20,7 @@ from kurumaisu.critic.ranges.noise.scan_noise import (
 )
 from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
+    Grams,
     Layout,
     OffsetProducts,
     ScanNoise,
@@ -161,9 +162,9 @@ class Assembly:
         out: list[PoseEvidence] = []
         for _ in range(2):  # without outliers in the second round
             left, out = np.full_like(self.residual, np.nan), []
-            for k, gram in enumerate(self.grams(beam)):
+            for k, gram in enumerate(self.grams(beam).leads):
                 own, shared, _ = self._rows(k, None)
-                lead = gram.own + gram.shared
+                lead = gram.lead
                 sizes = np.concatenate([np.tile(size, gram.own // 3), [_BROAD.common_sd], size])[:lead]
                 errors = np.linalg.solve(gram.matrix[:lead, :lead] + np.diag(sizes**-2), gram.matrix[:lead, -1])
                 left[k] = self.residual[k] - np.hstack([own, shared]) @ errors
@@ -302,25 +303,27 @@ class Assembly:
         grams, cross = other._crossed(beam, other.columns.shape[2])
         return without_beam_offsets(grams, cross, self.layout, normal.wary, normal.beam_noise.own_sd)
 
-    def _crossed(self, beam: BeamNoise, count: int) -> tuple[list[Gram], OffsetProducts]:
+    def _crossed(self, beam: BeamNoise, count: int) -> tuple[Grams, OffsetProducts]:
         """Return the first columns' normal equations of each scan, and what single beams' offsets share with them."""
         beams = self.residual.shape[1]
         inner, common = np.zeros((beams, beams)), np.zeros((beams, count + 1))
-        grams, parts = [], []
-        for k, (rows, gram) in enumerate(self._whitened(beam, np.arange(count), lasting=True)):
-            grams.append(gram)
-            products = offset_products(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
-            lead = gram.own + gram.shared
-            parts.append(products[:, :lead])
-            common += products[:, lead:]
-        return grams, OffsetProducts(tuple(parts), common, inner)
+        parts = []
 
-    def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> list[Gram]:
+        def grams() -> Iterator[Gram]:
+            for k, (rows, gram) in enumerate(self._whitened(beam, np.arange(count), lasting=True)):
+                products = offset_products(rows, beam.valid[k], beam.sd[k], beam.rho, inner)
+                parts.append(products[:, : gram.lead].copy())
+                common[:] += products[:, gram.lead :]
+                yield gram
+
+        return Grams.summed(grams()), OffsetProducts(tuple(parts), common, inner)
+
+    def grams(self, beam: BeamNoise, columns: IntArray | None = None, *, lasting: bool = False) -> Grams:
         """Return the normal equations of each scan; columns: which of all, None for all.
 
         lasting: with what lasts of the errors of the poses.
         """
-        return [gram for _, gram in self._whitened(beam, columns, lasting=lasting)]
+        return Grams.summed(gram for _, gram in self._whitened(beam, columns, lasting=lasting))
 
     def _whitened(
         self, beam: BeamNoise, columns: IntArray | None, *, lasting: bool
@@ -358,9 +361,9 @@ class Assembly:
         total = Stacked(grams, self.layout).marginal(_BROAD)[0]
         beta = _solve(total[:-1, :-1], total[:-1, -1])
         out: FloatArray = np.empty_like(self.residual)
-        for k, gram in enumerate(grams):
+        for k, gram in enumerate(grams.leads):
             own, shared, common = self._rows(k, columns)
-            random, lead = np.hstack([own, shared]), gram.own + gram.shared
+            random, lead = np.hstack([own, shared]), gram.lead
             target = gram.matrix[:lead, -1] - gram.matrix[:lead, lead:-1] @ beta
             fitted = np.where(beam.valid[k][:, np.newaxis], random, 0.0)
             solved = _solve(gram.matrix[:lead, :lead], np.column_stack([target, fitted.T]))
