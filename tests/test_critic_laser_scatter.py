@@ -71,6 +71,21 @@ def test_what_is_likeliest_alone_is_weighed_again_in_company():
     assert {each.setting.id for each in found} == {setting.id for setting in truth}
 
 
+class _Seldom(_Linear):
+    """As strays do: of a few more in a thousand readings there may be none."""
+
+    def __call__(self, settings, seed):
+        return np.floor(super().__call__(settings, seed) + 0.5)
+
+
+def test_what_is_too_rare_for_a_small_step_to_show_is_moved_by_a_longer_one():
+    simulate = _Seldom({"laser.heavy_tails.outliers": (60.0, 60.0, 60.0, 0.0, 0.0)})
+    fit = ScatterFit(simulate, simulate([at("laser.heavy_tails", outliers=0.0024)], 5), (), frozenset())
+    start = at("laser.heavy_tails", outliers=0.0006)
+    (found,), _ = fit.together([ScatterPiece(effects.by_id(start.id), start, ("outliers",))], ())
+    assert 0.0014 < found.setting.parameters["outliers"] < 0.0026
+
+
 class _Tails(_Linear):
     """As tails do: how wide the core is shows only where there are tails."""
 

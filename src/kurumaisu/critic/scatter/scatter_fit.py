@@ -6,7 +6,7 @@ Which numbers an effect changes is found by simulating it. No effect is named.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from operator import attrgetter
@@ -30,6 +30,7 @@ _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
 _FARTHEST = 3.0  # such a step, in units of the first difference
 _FINER = 0.5  # of one step's difference is the next one's
+_SHOWS, _LONGEST = 0.5, 8.0  # sds by which numbers must change to tell a slope; times a step is made longer at most
 _SETTLED = 0.3  # nats that another step must bring
 _FREE = 2.0  # nats that a shape must bring; a further amplitude must show like any other one
 _NONE = 1e-6  # of what a shape is usually
@@ -261,9 +262,8 @@ class ScatterFit:
         here = numbers(x)
         low = self.likeness.cost(here)
         for _ in range(_ROUNDS):
-            first = numbers(x, (1,))  # the same draws before and after: one simulation tells a slope
-            moved = [numbers(x + reach * one, (1,)) - first for one in np.eye(len(x))]
-            move = self.likeness.step(here, np.array(moved) / reach)
+            slopes = [self._slope(lambda at: numbers(at, (1,)), x, reach * one) for one in np.eye(len(x))]
+            move = self.likeness.step(here, np.array(slopes) / reach)
             before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
             for share in _SHARES:
                 tried = numbers(x + share * move)
@@ -273,6 +273,18 @@ class ScatterFit:
             if before - low < _SETTLED:
                 break
         return at(x), low
+
+    def _slope(self, numbers: Callable[[FloatArray], FloatArray], x: FloatArray, step: FloatArray) -> FloatArray:
+        """Return by how much the numbers change per step, by one that shows: of few strays, a few more may be none.
+
+        numbers: of the same draws before and after, so that one simulation tells.
+        """
+        first, times = numbers(x), 1.0
+        moved = numbers(x + step) - first
+        while np.linalg.norm(self.likeness.whitened(moved, first)) < _SHOWS and times < _LONGEST:
+            times *= 2
+            moved = numbers(x + times * step) - first
+        return moved / times
 
     def errors(self, piece: ScatterPiece, every: Sequence[EffectSetting]) -> dict[str, tuple[float, float]]:
         """Return sds below and above the parameters that were fitted, from how the statistics follow each.
