@@ -19,8 +19,9 @@ from kurumaisu.ros.testing.nodes import Commander, Topic, pose_of, wait_for
 
 def at(topic, stamp):
     """The pose of a topic interpolated at a time [s]."""
-    times = np.array([message.header.stamp.to_sec() for message in topic.messages])
-    poses = np.array([pose_of(message) for message in topic.messages])
+    messages = list(topic.messages)  # more come while they are looked at
+    times = np.array([message.header.stamp.to_sec() for message in messages])
+    poses = np.array([pose_of(message) for message in messages])
     poses[:, 2] = np.unwrap(poses[:, 2])
     return geometry.interpolate(times, poses, np.array([stamp]))[0]
 
