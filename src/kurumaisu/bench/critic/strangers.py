@@ -32,6 +32,7 @@ GENERATORS = ("fell", "quay", "holm", "tarn")  # the first two to report on
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 _Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
 _NAMED = 0.9
+_STRAY = 8.0  # sds off what the true causes predict, from which an answer is none of them
 _Q = 0.5  # [nat] by which the answers must be worse than the model's own to be told so, for each query
 
 
@@ -175,8 +176,9 @@ def _densities(path: Path, found: Criticism) -> tuple[float, float, float]:
             times = round(float(row["t0"]), 3), round(float(row["t1"]), 3)
             key = row["run"], row["channel"], *times, int(row["beam"] or -1)
             mean, sd = said.get(key, (np.nan, np.nan))
-            if np.isfinite(mean) and np.isfinite(sd):
-                value = float(row["value"])
+            value = float(row["value"])
+            stray = abs(value - float(row["oracle_mean"])) > _STRAY * float(row["oracle_sd"])  # one would decide all
+            if np.isfinite(mean) and np.isfinite(sd) and not stray:
                 model += _density(value, float(row["base_mean"]), float(row["base_sd"]))
                 oracle += _density(value, float(row["oracle_mean"]), float(row["oracle_sd"]))
                 ours += _density(value, mean, sd)
