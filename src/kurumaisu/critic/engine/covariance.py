@@ -19,7 +19,7 @@ class Covariance:
     variances (n,): along orthonormal directions, which stay combinations of the columns: they are never written out.
     """
 
-    def __init__(self, columns: FloatArray | NDArray[np.float32], gram: FloatArray | None = None) -> None:
+    def __init__(self, columns: FloatArray, gram: FloatArray | None = None) -> None:
         """Take columns; gram: their products U'U, where they are known."""
         values, vectors = np.linalg.eigh(columns.T @ columns if gram is None else gram)
         use = values > _SEEN
@@ -55,7 +55,7 @@ class Covariance:
 
         Of many columns single precision is enough, and takes half as long.
         """
-        whole = self._whole.astype(np.float32, copy=False) if columns.dtype == np.float32 else self._whole
+        whole = self._whole.astype(np.float32) if columns.dtype == np.float32 else self._whole
         return np.asarray(self._turn.T @ (whole.T @ columns).astype(np.float64))
 
     def gain(self, left: FloatArray) -> float:

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from scipy.special import logsumexp
@@ -252,14 +251,14 @@ class Problem:
     def _beside(self, terms: Sequence[Term], solution: least_squares.Solution) -> Beside:
         own = orthonormal(solution.slopes)
         columns = form_errors(self, terms, solution.values, own)
-        # A fit keeps them: in single precision, they take half the memory. Products are of what is kept, to the digit.
-        whole = np.concatenate([np.empty((len(own), 0)), *columns.values()], axis=1, dtype=np.float32)
-        exact = whole.astype(np.float64)
-        gram = exact.T @ exact
+        whole = np.column_stack([np.empty((len(own), 0)), *columns.values()])
+        gram: FloatArray = np.asarray(whole.T @ whole, dtype=np.float64)
         missed = Covariance(whole, gram)
-        ends = np.cumsum([0, *(some.shape[1] for some in columns.values())]).tolist()
-        spans = [slice(start, end) for start, end in pairwise(ends)]
-        blocks = {name: Covariance(exact[:, span], gram[span, span]) for name, span in zip(columns, spans, strict=True)}
+        ends = np.cumsum([some.shape[1] for some in columns.values()])
+        blocks = {
+            name: Covariance(some, gram[end - some.shape[1] : end, end - some.shape[1] : end])
+            for (name, some), end in zip(columns.items(), ends, strict=True)
+        }
         left = without(own, solution.residual)
         gains = [missed.scaled(share).gain(left) for share in SHARES]
         best = SHARES[int(np.argmax(gains))]
