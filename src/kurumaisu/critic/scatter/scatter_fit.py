@@ -262,7 +262,7 @@ class ScatterFit:
         here = numbers(x)
         low = self.likeness.cost(here)
         for _ in range(_ROUNDS):
-            slopes = [self._slope(lambda at: numbers(at, (1,)), x, reach * one) for one in np.eye(len(x))]
+            slopes = [self._slope(lambda moved: numbers(moved, (1,)), x, reach * one) for one in np.eye(len(x))]
             move = self.likeness.step(here, np.array(slopes) / reach)
             before, move, reach = low, np.clip(move, -_FARTHEST, _FARTHEST), _FINER * reach
             for share in _SHARES:
