@@ -35,9 +35,11 @@ def test_where_scans_are_criticised_makes_no_difference(alone, monkeypatch, work
     monkeypatch.setattr(module.os, "sched_getaffinity", lambda _: {0, 1})
     monkeypatch.setattr(module, "Worker", lambda: asked.append(worker) or worker())
     with module.criticise_in_own_process(data, MODEL, MD100, None) as scans_say:
-        found = scans_say(here.append)
+        mean, found = scans_say(here.append)
     assert asked == [worker]
     assert bool(here) == (worker is Dying)
     assert found.causes == wanted.causes
     assert found.details == wanted.details
+    assert mean.causes == wanted.causes
+    assert not mean.pictures.comparisons
     assert [cause.id for cause in found.causes] == ["laser.quadratic"]

@@ -18,7 +18,7 @@ from kurumaisu.critic.judge.explain import extended_text
 from kurumaisu.critic.judge.merge import confirmed_scans, with_scans
 from kurumaisu.critic.judge.multipliers import with_robot
 from kurumaisu.critic.judge.reference_faults import by_commands, by_its_clock, from_base_link, mountings, ruled_out
-from kurumaisu.critic.judge.scan_verdict import criticise_scans
+from kurumaisu.critic.judge.scan_verdict import criticise_scans, scan_findings
 from kurumaisu.critic.predict import predictions
 from kurumaisu.critic.processes.laser_process import criticise_in_own_process
 from kurumaisu.critic.ranges.scans.gathering import with_sweep_time
@@ -64,23 +64,27 @@ def criticise(
         base, extension = criticise_drives(whole, model, progress, ids) if moved else (None, NOTHING)
         if base is not None and base.verdict.verdict == "invalid_data":
             return with_robot(base, recording)
-        scans = scans_say(progress)
+        findings = scans_say(progress)
+        scans = next(findings)
         if base is not None and extension.points:
             base, extension = _beside_scans(base, extension, scans, whole, model, progress, ids)
-    found = base or explain.undriven(recording, model)
+        found = base or explain.undriven(recording, model)
 
-    def again(moved: Recording) -> LaserFinding:
-        return criticise_scans(moved, model, progress, ids)
+        def again(moved: Recording) -> LaserFinding:
+            return criticise_scans(moved, model, progress, ids)
 
-    seen, stamped = by_its_clock(found.verdict.causes, scans, scanned, model, again)
-    scans, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
+        seen, stamped = by_its_clock(found.verdict.causes, scans, scanned, model, again)
+        there, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
+        if there is scans:  # not only the mean readings, but how they scatter: where they are seen from is settled
+            there = next(findings)
+            settings = there.settings
     forecast = extension.forecast
     if forecast is not None and stamped is not scanned:
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
     stamped = with_elapsed_time(stamped)
     progress("measuring the gain on held-out scans")
-    beside = tuple(each for each in settings if each not in scans.settings)
-    scans, worth = confirmed_scans(scans, lambda told: scan_gain.measure(stamped, model, forecast, (*told, *beside)))
+    beside = tuple(each for each in settings if each not in there.settings)
+    scans, worth = confirmed_scans(there, lambda told: scan_gain.measure(stamped, model, forecast, (*told, *beside)))
     settings = (*scans.settings, *beside)
     found = with_scan_gain(with_scans(found, scans), worth)
     if slam:
@@ -107,7 +111,7 @@ def _beside_scans(
     """Return what the drives say, without what the scans refute of their sets."""
 
     def mounted(there: Recording) -> LaserFinding:
-        return criticise_scans(there, model, progress, mountings(model))
+        return next(scan_findings(there, model, progress, mountings(model)))
 
     told = ruled_out(extension.points, base.verdict.confounded, scans, recording, model, mounted)
     if not told:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,56 +65,84 @@ class _Question:
     progress: Progress
     ids: frozenset[str] | None
 
-    def beside(self, setting: EffectSetting) -> LaserFinding:
-        """Return what the scans say with an effect in the model."""
+    def beside(self, setting: EffectSetting) -> Iterator[LaserFinding]:
+        """Yield what the scans say with an effect in the model."""
         self.progress(f"laser: looking for more effects, with {setting.id} in the model")
-        return criticise_scans(self.recording, extend(self.model, [setting]), self.progress, self.ids)
+        yield from scan_findings(self.recording, extend(self.model, [setting]), self.progress, self.ids)
 
 
 def criticise_scans(
-    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None, *, posed: bool = False
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None
 ) -> LaserFinding:
-    """Return what the scans of a recording say against a model, or why they cannot.
+    """Return what the scans of a recording say against a model, or why they cannot; ids as of scan_findings."""
+    *_, whole = scan_findings(recording, model, progress, ids)
+    return whole
 
-    ids: the effects that may be named; None for all. posed: whether the laser may be elsewhere than the reference says
-    from the start on; else this is asked at the end.
+
+def scan_findings(
+    recording: Recording, model: Model, progress: Progress, ids: frozenset[str] | None = None
+) -> Iterator[LaserFinding]:
+    """Yield what the scans of a recording say against a model by their mean readings, then all that they say.
+
+    ids: the effects that may be named; None for all.
     """
     why = why_not_usable(recording)
     if why is not None:
         drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
-        return LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
-    question = _Question(recording, model, progress, ids)
+        refused = LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
+        yield from (refused, refused)
+        return
+    found = _findings(_Question(recording, model, progress, ids), posed=False)
+    first = next(found)
+    yield first
+    yield next(found, first)
+
+
+def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
+    """Yield what the scans say, by their mean readings first if they have more to say.
+
+    posed: whether the laser may be elsewhere than the reference says from the start on; else this is asked at the end.
+    """
+    recording, model, progress, ids = question.recording, question.model, question.progress, question.ids
     progress("laser: predicting the scans")
     assembly = Assembly(gather_stands(recording, model), ids)
     progress("laser: estimating the noise")
     normal = assembly.settle(recording.truth)
     if normal.readings < _FEWEST or assembly.shots.walls.stairs:
-        return LaserFinding(refused=_too_few(assembly, normal), details=repeatability.sentences(recording, model))
+        yield LaserFinding(refused=_too_few(assembly, normal), details=repeatability.sentences(recording, model))
+        return
     if (far := large_effect(assembly.shots, ids)) is not None:
-        return _large_effect_first(question, assembly, normal, far)
+        yield from _large_effect_first(question, assembly, normal, far)
+        return
     progress("laser: comparing effects")
     normal, found = _searched(assembly, normal, recording.truth)
     normal, families = with_doubt(assembly, normal, found)
     made = mean_effects(assembly, normal, found, families, posed=posed)
     if (wrong := another_map(made.winner, normal, float(assembly.map_change.readings.mean()))) is not None:
-        return LaserFinding(wrong=wrong)
+        yield LaserFinding(wrong=wrong)
+        return
     progress("laser: fitting the effects found")
     fit = refitted(assembly, normal, made, recording.truth)
     if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
         evidence = (min(made.found.p[lead[0].id], 1.0), gain_of(made, lead[0].id))
-        return _with_rest(assembly, normal, lead, evidence, question.beside(lead[0]))
+        for rest in question.beside(lead[0]):
+            yield _with_rest(assembly, normal, lead, evidence, rest)
+        return
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     if recording.truth is not None:
         beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms)
         # What equations nearly right leave of what acts looks like a reference that wanders, too.
         if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
             progress("laser: the reference errs by more than is said")
-            return criticise_scans(replace(recording, truth=None), model, progress, ids, posed=posed)
+            yield from _findings(replace(question, recording=replace(recording, truth=None)), posed=posed)
+            return
     curves = ids is None or effects.SMOOTH in ids
     if curves and not posed and not made.curve and pose_curves_left(fit, normal):
         progress("laser: it is elsewhere than the reference says")
-        return criticise_scans(recording, model, progress, ids, posed=True)
-    return _with_scatter(question, MeanFit(assembly, normal, made, fit))
+        yield from _findings(question, posed=True)
+        return
+    yield _finding(assembly, normal, made, fit, Scatter([], [], ()))
+    yield _with_scatter(question, MeanFit(assembly, normal, made, fit))
 
 
 def _too_few(assembly: Assembly, normal: NormalEquations) -> str:
@@ -133,12 +161,13 @@ def _too_few(assembly: Assembly, normal: NormalEquations) -> str:
 
 def _large_effect_first(
     question: _Question, assembly: Assembly, normal: NormalEquations, far: EffectSetting
-) -> LaserFinding:
-    """Return the finding where an effect is too large for lines to lead to it: it is placed, then the rest is seen."""
+) -> Iterator[LaserFinding]:
+    """Yield the findings where an effect is too large for lines to lead to it: it is placed, then the rest is seen."""
     form = next(form for form in assembly.forms if form.id == far.id)
     (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, question.recording.truth).settings
     evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
-    return _with_rest(assembly, normal, placed, evidence, question.beside(placed[0]))
+    for rest in question.beside(placed[0]):
+        yield _with_rest(assembly, normal, placed, evidence, rest)
 
 
 def _searched(

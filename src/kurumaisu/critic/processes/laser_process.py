@@ -6,15 +6,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 
-from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.processes.worker import ProgressMessage, Worker
+from kurumaisu.critic.judge.scan_verdict import scan_findings
+from kurumaisu.critic.processes.worker import Worker
 from kurumaisu.critic.ranges.scans.gathering import why_not_usable
 from kurumaisu.critic.values.criticism import LaserFinding
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.params import Model, load_model
 
+_FINDINGS = 2  # that scan_findings yields
 _MANY = 500  # scans from which it is worth the second that another interpreter needs
 
 Tell = Callable[[str], None]
@@ -23,8 +25,8 @@ Tell = Callable[[str], None]
 @contextmanager
 def criticise_in_own_process(
     recording: Recording, model: Model, model_file: Path, ids: frozenset[str] | None
-) -> Iterator[Callable[[Tell], LaserFinding]]:
-    """Give a function that returns what the scans say, which may have been found out meanwhile.
+) -> Iterator[Callable[[Tell], Iterator[LaserFinding]]]:
+    """Give a function that yields what scan_findings does, which may have been found out meanwhile.
 
     model_file: of the model, whose laws of the voltages no scan depends on.
     It makes no difference to the result where that happens; what fails in the other process is done again in this one.
@@ -35,19 +37,23 @@ def criticise_in_own_process(
     if worker is not None:
         worker.send(_criticise, recording, model_file, ids)
 
-    def finding(progress: Tell) -> LaserFinding:
-        found = None
+    def findings(progress: Tell) -> Iterator[LaserFinding]:
+        count = 0
         with suppress(EOFError):  # it has died, of whatever it was
-            while worker is not None and isinstance(found := worker.receive(), ProgressMessage):
-                pass
-        return found if isinstance(found, LaserFinding) else criticise_scans(recording, model, progress, ids)
+            while worker is not None and count < _FINDINGS:
+                if isinstance(found := worker.receive(), LaserFinding):
+                    count += 1
+                    yield found
+        yield from islice(scan_findings(recording, model, progress, ids), count, None)
 
     try:
-        yield finding
+        yield findings
     finally:
         if worker is not None:
             worker.close()
 
 
-def _criticise(recording: Recording, model_file: Path, ids: frozenset[str] | None, progress: Tell) -> LaserFinding:
-    return criticise_scans(recording, load_model(model_file), progress, ids)
+def _criticise(
+    recording: Recording, model_file: Path, ids: frozenset[str] | None, progress: Tell
+) -> Iterator[LaserFinding]:
+    return scan_findings(recording, load_model(model_file), progress, ids)

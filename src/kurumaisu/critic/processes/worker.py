@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe
@@ -31,7 +31,7 @@ class ProgressMessage:
 
 
 class Worker:
-    """The other end: send a task and its arguments, receive Progress and at last the result.
+    """The other end: send a task and its arguments, receive Progress and at last the result, or each of an iterator's.
 
     A new interpreter rather than a fork, for the parent may have threads, and need not guard its main module.
     """
@@ -89,7 +89,9 @@ def main(descriptor: int) -> None:
     threading.Thread(target=_listen, args=(connection, received), daemon=True).start()
     while True:
         task, arguments = pickle.loads(received.get())  # from our own parent
-        connection.send(task(*arguments, lambda message: connection.send(ProgressMessage(message))))
+        result = task(*arguments, lambda message: connection.send(ProgressMessage(message)))
+        for part in result if isinstance(result, Iterator) else (result,):
+            connection.send(part)
 
 
 def _listen(connection: Connection, received: SimpleQueue[bytes]) -> None:
