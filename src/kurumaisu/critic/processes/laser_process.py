@@ -44,7 +44,8 @@ def criticise_in_own_process(
                 if isinstance(found := worker.receive(), LaserFinding):
                     count += 1
                     yield found
-        yield from islice(scan_findings(recording, model, progress, ids), count, None)
+        if count < _FINDINGS:
+            yield from islice(scan_findings(recording, model, progress, ids), count, None)
 
     try:
         yield findings
