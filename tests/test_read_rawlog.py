@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.log_reader import to_run
+from kurumaisu.critic.data.odometry import rates_between
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.errors import Error
 
@@ -20,14 +19,8 @@ def test_rates_are_those_of_the_arc_driven():
     t = np.array([0.0, 0.1, 0.3, 0.4])
     v, w = 0.7, -2.5
     odom = np.column_stack([v / w * np.sin(w * t), v / w * (1 - np.cos(w * t)), w * t])
-    ranges = np.ones((4, 3))
-    faults = Faults()
-    run = to_run("a", t, odom, ranges, faults)
-    np.testing.assert_allclose(run.odom.column("v"), v, rtol=1e-12)
-    np.testing.assert_allclose(run.odom.column("w"), w, rtol=1e-12)
-    assert run.scan.values.shape == (4, 3)
-    assert run.pose is None
-    assert faults.notes == []
+    v_w = rates_between(t, odom)
+    np.testing.assert_allclose(v_w, np.tile([v, w], (4, 1)), rtol=1e-12)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("kurumaisu._slam") is None, reason="built without kurumaisu._slam")

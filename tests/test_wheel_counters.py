@@ -10,7 +10,7 @@ from recordings import Bag
 from kurumaisu.critic import Meta, criticise_arrays
 from kurumaisu.critic.app.arrays import recording_of
 from kurumaisu.critic.data.clean import Faults
-from kurumaisu.critic.data.odometry import Counter, counted
+from kurumaisu.critic.data.odometry import Wheel, Wheels, counted
 from kurumaisu.critic.data.reading import read_recording
 from kurumaisu.params import robot_of
 from kurumaisu.settings import Section
@@ -234,8 +234,8 @@ def test_no_step_of_any_counter_is_read_wrong(kind):
             continue
         given = counts if kind is None else (counts + rng.integers(size)) % size
         given = np.where((given >= size / 2) & (rng.random() < 0.5), given - size, given)
-        turn = 2 * np.pi / ticks
-        read, spans = counted(Counter("left", turn, 0.1 * turn), t, given, Faults())
+        wheels = Wheels(("left",), ("right",), radius=0.1, track=0.5, ticks_per_turn=ticks)
+        read, spans = counted(wheels, Wheel("left", t, given), Faults())
         unknown = np.isin(t[:-1], [start for start, _ in spans])
         np.testing.assert_allclose(np.diff(read)[~unknown], np.diff(counts)[~unknown], atol=1e-6)
         steps, lost = steps + len(unknown), lost + unknown.sum()

@@ -102,8 +102,9 @@ def _work_out(path: Path, meta: Meta, series: dict[str, Series | None], faults: 
         t, rows = read_frame(path, *meta.frames)
         series["pose"] = clean(Table(where, t, rows, COLUMNS[:3], "transform", 1), faults)
     if meta.wheels is not None:
-        t, rows, lost = read_wheels(path, meta.wheels, faults)
-        series["odom"] = clean(Table(f"{path.name} wheels", t, rows, COLUMNS, "message", 1), faults)
+        odom, lost = read_wheels(path, meta.wheels, faults)
+        table = Table(f"{path.name} wheels", odom.t, odom.values, odom.columns, "message", 1)
+        series["odom"] = clean(table, faults)
     return lost
 
 

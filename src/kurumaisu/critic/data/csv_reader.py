@@ -8,7 +8,7 @@ import io
 import math
 from array import array
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -200,52 +200,33 @@ def _check_header(path: Path, columns: list[str], required: tuple[str, ...]) -> 
         seen.add(name)
 
 
-@dataclass
-class _Column:
-    """What was read of a column; bad: line and cell of the first that is no number."""
-
-    name: str
-    blank: bool  # whether cells may be empty
-    values: array[float] = field(default_factory=lambda: array("d"))
-    bad: tuple[int, str] | None = None
-    numbers: bool = False
-
-    def add(self, cell: str, line: int) -> None:
-        number = _number(cell, self.blank)
-        if number is None and self.bad is None:
-            self.bad = line, cell
-        self.numbers |= number is not None and not math.isnan(number)
-        self.values.append(math.nan if number is None else number)
-
-
 def _read_cells(
     path: Path, reader: Reader, names: list[str], full: tuple[str, ...]
 ) -> tuple[list[str], FloatArray, list[str]]:
-    """Read cell by cell: slow, but finds the fault, takes quotes, and empty cells where columns may have them."""
+    """Read cell by cell: slow, but finds the fault, takes quotes, and empty cells where columns may have them.
+
+    full: columns that have a number in each row, as beams do.
+    """
     next(reader)
-    columns = [_Column(name, name not in full and not _is_beam(name)) for name in names]
+    blank = [name not in full and not _is_beam(name) for name in names]
+    cells, bad = array("d"), dict[int, tuple[int, str]]()  # bad: line and cell of a column's first that is no number
     for row in reader:
-        if row and len(row) != len(columns):
-            raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(columns)} columns")
-        for column, cell in zip(columns, row, strict=False):
-            column.add(cell.strip(), reader.line_num)
-    dropped = [column.name for column in columns if column.bad and column.blank and not column.numbers]
-    kept = [column for column in columns if column.name not in dropped]
-    for column in kept:
-        if column.bad is not None:
-            line, cell = column.bad
-            raise Error(f"{path}:{line}: column {column.name!r}: is not a number: {told(cell)}")
-    values = [np.frombuffer(column.values, dtype=np.float64) for column in kept]
-    return [column.name for column in kept], np.column_stack(values) if values else np.empty((0, 0)), dropped
-
-
-def _number(cell: str, blank: bool) -> float | None:
-    if blank and not cell:
-        return math.nan
-    try:
-        return float(cell)
-    except ValueError:
-        return None
+        if row and len(row) != len(names):
+            raise Error(f"{path}:{reader.line_num}: {len(row)} cells under {len(names)} columns")
+        for i, cell in enumerate(row):
+            try:
+                cells.append(float(cell))
+            except ValueError:
+                cells.append(math.nan)
+                if cell.strip() or not blank[i]:
+                    bad.setdefault(i, (reader.line_num, cell.strip()))
+    rows = np.asarray(cells, dtype=np.float64).reshape(-1, len(names))
+    dropped = [i for i in sorted(bad) if blank[i] and np.isnan(rows[:, i]).all()]
+    for i in sorted(bad.keys() - dropped):
+        line, cell = bad[i]
+        raise Error(f"{path}:{line}: column {names[i]!r}: is not a number: {told(cell)}")
+    kept = [name for i, name in enumerate(names) if i not in dropped]
+    return kept, np.delete(rows, dropped, axis=1), [names[i] for i in dropped]
 
 
 def read_tum(path: Path) -> tuple[FloatArray, FloatArray]:
@@ -256,20 +237,15 @@ def read_tum(path: Path) -> tuple[FloatArray, FloatArray]:
     rows = []
     for number, line in enumerate(read_text(path, MOST_TABLE, "utf-8-sig").splitlines(), 1):
         cells = line.split("#")[0].split()
-        if cells:
-            rows.append(_row(f"{path}:{number}", cells))
+        if cells and len(cells) != _NUMBERS:
+            raise Error(f"{path}:{number}: has {len(cells)} numbers, and not the 8 of t x y z qx qy qz qw")
+        try:
+            rows += [list(map(float, cells))] if cells else []
+        except ValueError:
+            raise Error(f"{path}:{number}: is not a row of numbers: {told(' '.join(cells))}") from None
     table = np.array(rows, dtype=np.float64).reshape(-1, _NUMBERS)
     theta = [yaw_or_nan(*row[4:]) for row in table.tolist()]
     return table[:, 0], np.column_stack([table[:, 1:3], theta])
-
-
-def _row(where: str, cells: list[str]) -> list[float]:
-    if len(cells) != _NUMBERS:
-        raise Error(f"{where}: has {len(cells)} numbers, and not the 8 of t x y z qx qy qz qw")
-    try:
-        return [float(cell) for cell in cells]
-    except ValueError:
-        raise Error(f"{where}: is not a row of numbers: {told(' '.join(cells))}") from None
 
 
 def write_csv_run(folder: Path, run: Run) -> None:

@@ -14,10 +14,9 @@ import numpy as np
 from kurumaisu import geometry
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean
-from kurumaisu.critic.data.odometry import COLUMNS, rates_between
+from kurumaisu.critic.data.odometry import COLUMNS
 from kurumaisu.critic.values.recording import Fan, LaserMount, Run, Series
 from kurumaisu.errors import Error, told
-from kurumaisu.types import FloatArray
 
 SUFFIXES = (".clf", ".log")
 _TAIL = 3  # cells at the end of each line: when it was measured, by which computer, when it was written
@@ -153,20 +152,12 @@ def rawlog_name(path: Path) -> str:
 def read_rawlog_run(path: Path, faults: Faults) -> tuple[Run, LaserMount]:
     """Read a rawlog: the run, and the mounting and fan of its laser. Raise Error where MRPT cannot, or is not."""
     log = import_module("kurumaisu.slam").read_rawlog(path)
-    run = to_run(rawlog_name(path), log.times, log.odom, np.asarray(log.ranges, dtype=np.float64), faults)
-    x, y, yaw = log.fan.base_from_laser
-    return run, LaserMount(x, y, yaw, log.fan.angle_min, log.fan.angle_increment, log.ranges.shape[1])
-
-
-def to_run(name: str, t: FloatArray, odom: FloatArray, ranges: FloatArray, faults: Faults) -> Run:
-    """Return a run from times of scans (n,) [s], odometry poses there (n, 3) and ranges (n, beams) [m].
-
-    The rates of a row are those of the interval that ends there; the first row's are those of the second.
-    """
-    rows = np.column_stack([odom, rates_between(t, odom)])
+    where, ranges = rawlog_name(path), np.asarray(log.ranges, dtype=np.float64)
     beams = tuple(f"r{i}" for i in range(ranges.shape[1]))
-    return Run(
-        name=name,
-        odom=clean(Table(f"{name} odometry", t, rows, COLUMNS, "entry", 1), faults),
-        scan=clean(Table(f"{name} scans", t, ranges, beams, "entry", 1), faults, ranges=True),
+    run = Run(
+        name=where,
+        odom=clean(Table(f"{where} odometry", log.times, log.odom, COLUMNS[:3], "entry", 1), faults),
+        scan=clean(Table(f"{where} scans", log.times, ranges, beams, "entry", 1), faults, ranges=True),
     )
+    x, y, yaw = log.fan.base_from_laser
+    return run, LaserMount(x, y, yaw, log.fan.angle_min, log.fan.angle_increment, len(beams))

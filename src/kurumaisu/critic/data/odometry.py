@@ -58,20 +58,14 @@ class Wheels:
         left, right = self.radius * wheels.T
         return np.stack([(left + right) / 2, (right - left) / self.track], axis=1)
 
-    def counter(self, where: str) -> Counter:
-        """Return the counter of a wheel that is read there."""
-        return Counter(where, self.turn, self.turn * self.radius)
 
-    def odometry(self, t: FloatArray, counts: FloatArray, lost: Spans) -> FloatArray:
-        """Return rows (n, 5) of x, y, theta, v, w, from 0, of what both sides' counters say (n, 2) at times (n,) [s].
+@dataclass(frozen=True)
+class Wheel:
+    """A wheel of either side: where it is read, in words, and what it says (n,) at increasing times (n,) [s]."""
 
-        lost: spans of time [s] in which it is not known what was driven: nothing, then.
-        """
-        steps = np.diff(counts, axis=0)
-        for start, stop in lost:
-            steps[(t[1:] > start) & (t[:-1] < stop)] = 0.0
-        poses = along(self.motion(self.turn * steps))
-        return np.column_stack([poses, rates_between(t, poses)])
+    where: str
+    t: FloatArray
+    values: FloatArray
 
 
 def with_wheels(where: str, name: str, parts: dict[str, Series | None], robot: Robot | None, faults: Faults) -> Spans:
@@ -91,19 +85,33 @@ def with_wheels(where: str, name: str, parts: dict[str, Series | None], robot: R
             raise Error(f"{where}/{each}: how large the wheels are is not said: `robot` in meta.yaml, radius and track")
         table = parts.pop(each)
         assert table is not None
-        if each == WHEEL_TABLES[0]:
-            wheels = Wheels(("left",), ("right",), robot.radius, robot.track, ticks_per_turn=robot.ticks_per_turn)
-            sides = [
-                counted(wheels.counter(f"{name}/{each}: {side}"), table.t, table.column(side), faults)
-                for side in table.columns
-            ]
-            lost = tuple(sorted({span for _, spans in sides for span in spans}))
-            rows = wheels.odometry(table.t, np.stack([counts for counts, _ in sides], axis=1), lost)
-        else:
-            moved = Wheels((), (), robot.radius, robot.track).motion(table.values)
-            rows = np.column_stack([driven_by(table.t, moved), moved])
-        parts["odom"] = Series(table.t, rows, COLUMNS)
+        wheels = Wheels(("left",), ("right",), robot.radius, robot.track, ticks_per_turn=robot.ticks_per_turn)
+        said = [Wheel(f"{name}/{each}: {side}", table.t, table.column(side)) for side in table.columns]
+        parts["odom"], lost = _odometry(wheels, said, faults, counts=each == WHEEL_TABLES[0])
     return lost
+
+
+def _odometry(wheels: Wheels, said: Sequence[Wheel], faults: Faults, *, counts: bool) -> tuple[Series, Spans]:
+    """Return the poses, from 0, by the wheels of the left and then the right side, and spans [s] that are not known.
+
+    counts: whether they say angles or ticks, of which nothing is driven in those spans; else rates, which the odometry
+    has then, too. faults gets jumps of what is counted.
+    """
+    lost: set[tuple[float, float]] = set()
+    t, at = said[0].t, []
+    for wheel in said:
+        values, spans = counted(wheels, wheel, faults) if counts else (wheel.values, ())
+        lost.update(spans)
+        at.append(np.interp(t, wheel.t, values))
+    left, right = np.array(at[: len(wheels.left)]), np.array(at[len(wheels.left) :])
+    sides = np.stack([left.mean(axis=0), right.mean(axis=0)], axis=1)
+    if not counts:
+        rates = wheels.motion(sides)
+        return Series(t, np.column_stack([driven_by(t, rates), rates]), COLUMNS), ()
+    steps = np.diff(sides, axis=0)
+    for start, stop in lost:
+        steps[(t[1:] > start) & (t[:-1] < stop)] = 0.0
+    return Series(t, along(wheels.motion(wheels.turn * steps)), COLUMNS[:3]), tuple(sorted(lost))
 
 
 def rates_between(t: FloatArray, poses: FloatArray) -> FloatArray:
@@ -138,36 +146,28 @@ def along(arcs: FloatArray) -> FloatArray:
     return np.stack([x, y, theta], axis=1)
 
 
-@dataclass(frozen=True)
-class Counter:
-    """A counter: where it is read, in words; how far its wheel turns for 1 [rad], and drives [m]."""
-
-    where: str
-    turn: float
-    way: float
-
-
-def counted(counter: Counter, t: FloatArray, counts: FloatArray, faults: Faults) -> tuple[FloatArray, Spans]:
-    """Return counts (n,) at times (n,) [s] without overflows, and spans [s] in which it is not known what was counted.
+def counted(wheels: Wheels, wheel: Wheel, faults: Faults) -> tuple[FloatArray, Spans]:
+    """Return what a wheel counts, (n,), without overflows, and spans [s] in which it is not known what was counted.
 
     An overflow is a jump to the other end of the smallest range that holds all counts, if the wheel, had it turned past
     that end, would not have turned faster than elsewhere, but otherwise much faster. In other jumps nothing is counted.
     faults gets the jumps of each kind: how many, and where the first is.
     """
+    t, counts = wheel.t, wheel.values
     steps = np.diff(counts)
     if not len(steps):
         return counts, ()
-    whole = 2 * np.pi / counter.turn
+    whole = 2 * np.pi / wheels.turn
     size = _range(counts, whole)
     around = np.where(np.abs(steps) > size / 2, steps - np.sign(steps) * size, steps)
-    overflows, unsure, jumps = _jumps(counter, t, counts, around, size)
+    overflows, unsure, jumps = _jumps(wheels, wheel, around, size)
     lost = unsure | jumps
 
     def tell(which: BoolArray, what: str, so: str) -> None:
         if which.any():
             first = int(np.argmax(which))
             place = f"from {counts[first]:.10g} to {counts[first + 1]:.10g} at t = {moment(float(t[first + 1]))}"
-            faults.add(f"{counter.where}: {what}, {times(int(which.sum()))} (first: {place}): {so}")
+            faults.add(f"{wheel.where}: {what}, {times(int(which.sum()))} (first: {place}): {so}")
 
     kind = "begins each turn of the wheel anew" if size == whole else f"overflows, as it counts to {size:.0f}"
     tell(overflows, kind, "it is counted on")
@@ -175,7 +175,7 @@ def counted(counter: Counter, t: FloatArray, counts: FloatArray, faults: Faults)
     tell(jumps, "jumps, which is neither an overflow nor motion", "that time is left out")
     if lost.sum() > HICCUP_SHARE * len(lost):
         faults.add(
-            f"{counter.where}: it is too often not known what was counted: {lost.sum()} of {len(lost)}", fatal=True
+            f"{wheel.where}: it is too often not known what was counted: {lost.sum()} of {len(lost)}", fatal=True
         )
     moved = np.where(lost, 0.0, np.where(overflows, around, steps))
     return counts[0] + np.append(0.0, np.cumsum(moved)), tuple(
@@ -194,20 +194,21 @@ def _range(counts: FloatArray, whole: float) -> float:
 
 
 def _jumps(
-    counter: Counter, t: FloatArray, counts: FloatArray, around: FloatArray, size: float
+    wheels: Wheels, wheel: Wheel, around: FloatArray, size: float
 ) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Return which steps are overflows, which may have gone either way, and which are no motion, (n - 1,) each.
 
     around: the steps, or the shorter way past the end of the range.
     """
-    steps, lasts = np.abs(np.diff(counts)), np.diff(t)
+    counts = wheel.values
+    steps, lasts = np.abs(np.diff(counts)), np.diff(wheel.t)
     usual = float(np.median(lasts))
     slow = np.maximum(lasts / usual, 1.0)
     over = steps > size / 2
     at_zero = np.minimum(np.abs(counts[:-1]), np.abs(counts[1:])) <= _NEAR * steps
-    wild = steps * counter.way > _FASTEST * usual * slow
+    wild = steps * wheels.turn * wheels.radius > _FASTEST * usual * slow
     others = (steps / slow)[~(over | at_zero | wild)]
-    least = max(float(others.max(initial=0.0)), min(_LEAST / counter.turn, _LEAST_SHARE * size))
+    least = max(float(others.max(initial=0.0)), min(_LEAST / wheels.turn, _LEAST_SHARE * size))
     may = _FASTER * slow * least
     possible = np.abs(around) <= may
     overflows = over & possible & (steps > may)
@@ -218,38 +219,17 @@ def _jumps(
     return overflows, unsure, jumps & ~overflows & ~unsure
 
 
-@dataclass(frozen=True)
-class _Wheel:
-    """A joint or topic, and what it says (n,) at increasing times (n,) [s]."""
-
-    name: str
-    t: FloatArray
-    values: FloatArray
-
-
-def read_wheels(path: Path, wheels: Wheels, faults: Faults) -> tuple[FloatArray, FloatArray, Spans]:
-    """Return times (n,) [s], rows (n, 5) of x, y, theta, v, w, beginning at 0, and spans [s] that are not known.
+def read_wheels(path: Path, wheels: Wheels, faults: Faults) -> tuple[Series, Spans]:
+    """Return the odometry of a bag's wheels, and spans [s] that are not known, as _odometry has them.
 
     Angles or ticks of joints are used where they are given, else rates. faults gets jumps of what is counted.
     Raise Error naming file, topic and joint.
     """
     said, counts = _joints(path, wheels) if wheels.topic else _topics(path, wheels)
-    lost: set[tuple[float, float]] = set()
-    for i, wheel in enumerate(said if counts else ()):
-        values, spans = counted(wheels.counter(f"{path.name} wheels: {wheel.name}"), wheel.t, wheel.values, faults)
-        said[i] = _Wheel(wheel.name, wheel.t, values)
-        lost.update(spans)
-    t = said[0].t
-    at = np.array([np.interp(t, wheel.t, wheel.values) for wheel in said])
-    lefts = len(wheels.left)
-    sides = np.stack([at[:lefts].mean(axis=0), at[lefts:].mean(axis=0)], axis=1)
-    if counts:
-        return t, wheels.odometry(t, sides, tuple(sorted(lost))), tuple(sorted(lost))
-    rates = wheels.motion(sides)
-    return t, np.column_stack([driven_by(t, rates), rates]), ()
+    return _odometry(wheels, said, faults, counts=counts)
 
 
-def _joints(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
+def _joints(path: Path, wheels: Wheels) -> tuple[list[Wheel], bool]:
     """Return the joints of the left and then the right side, and whether they say angles or ticks."""
     names = (*wheels.left, *wheels.right)
     seen: set[str] = set()
@@ -275,7 +255,7 @@ def _joints(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
     counts = bool(np.isfinite(angles).all())
     values = angles if counts else rates
     known = np.isfinite(values).all(axis=1) & np.r_[True, np.diff(t) > 0]
-    return [_Wheel(name, t[known], values[known, i]) for i, name in enumerate(names)], counts
+    return [Wheel(f"{path.name} wheels: {name}", t[known], values[known, i]) for i, name in enumerate(names)], counts
 
 
 def _of(message: Any, names: Sequence[str]) -> tuple[float, ...]:
@@ -288,7 +268,7 @@ def _of(message: Any, names: Sequence[str]) -> tuple[float, ...]:
     return tuple(float(values[place]) for values in given for place in places)
 
 
-def _topics(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
+def _topics(path: Path, wheels: Wheels) -> tuple[list[Wheel], bool]:
     """Return the topics of the left and then the right side, and whether they count ticks."""
     names = [absolute(name) for name in (*wheels.left, *wheels.right)]
     found = read_topics(path, dict.fromkeys(names, lambda _: lambda message: (float(message.data),)))
@@ -298,5 +278,5 @@ def _topics(path: Path, wheels: Wheels) -> tuple[list[_Wheel], bool]:
     said = []
     for name in names:
         times, order = np.unique(found[name].times(), return_index=True)
-        said.append(_Wheel(name, times, found[name].rows()[order, 0]))
+        said.append(Wheel(f"{path.name} wheels: {name}", times, found[name].rows()[order, 0]))
     return said, wheels.ticks_per_turn is not None
