@@ -13,9 +13,10 @@ from kurumaisu import program
 from kurumaisu.critic.app.display import cells, printable
 from kurumaisu.critic.app.options import add_robot, add_span, name_list
 from kurumaisu.critic.bags.containers import is_bag
+from kurumaisu.critic.bags.messages import shown
 from kurumaisu.critic.bags.parts import is_split
 from kurumaisu.critic.bags.survey import survey
-from kurumaisu.critic.bags.topics import Topic, shown
+from kurumaisu.critic.bags.topics import Topic
 from kurumaisu.critic.data.bag_reader import TOPICS, mappings, read_bag_topics, wanted_of
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.excerpt import WHOLE, Excerpt, cut

@@ -3,12 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
-
-from rosbags.interfaces import Connection
 
 from kurumaisu.bounded_files import MOST_RECORDING, check_file
 from kurumaisu.critic.bags.mcap_file import McapFile
@@ -23,32 +20,8 @@ _MENDING = {
     ".db3": ("ROS 2 bag", "ros2 bag reindex"),
 }
 
-
-class Bag(Protocol):
-    """A bag; times of receipt [ns], the end just after the last message."""
-
-    @property
-    def connections(self) -> list[Connection]:
-        """Who published what."""
-
-    @property
-    def start_time(self) -> int:
-        """Time of the first message."""
-
-    @property
-    def end_time(self) -> int:
-        """Time just after the last message."""
-
-    def messages(
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, time of receipt and data."""
-
-    def open(self) -> None:
-        """Find out what there is."""
-
-    def close(self) -> None:
-        """Forget it."""
+# Each has connections, start_time and end_time [ns], just after the last message, and messages().
+Bag = Ros1Bag | OldRos1Bag | McapFile | Database | Ros2Bag
 
 
 def is_bag(path: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import io
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -57,7 +57,7 @@ class McapFile:
 
     def open(self) -> None:
         """Find the channels; some may hold messages that are none of ROS."""
-        contents = stated_contents(self.path) or self._contents()
+        contents = stated_contents(self.path) or Contents.of(self._data())
         counts = contents.counts
         if sum(counts.values()):
             self.start_time, self.end_time = contents.first, contents.last + 1
@@ -82,19 +82,6 @@ class McapFile:
                 raise Error(f"{self.path}: what it states at its end lacks {told(record.topic)}")
             if isinstance(record, Message) and record.channel_id in wanted and first <= record.log_time < last:
                 yield wanted[record.channel_id], record.log_time, record.data
-
-    def _contents(self) -> Contents:
-        """Read all to find what there is."""
-        found = Contents(first=LATEST)
-        for record in self._data():
-            if isinstance(record, Schema):
-                found.schemas[record.id] = record
-            elif isinstance(record, Channel):
-                found.channels[record.id] = record
-            elif isinstance(record, Message):
-                found.counts[record.channel_id] = found.counts.get(record.channel_id, 0) + 1
-                found.first, found.last = min(found.first, record.log_time), max(found.last, record.log_time)
-        return found
 
     def _data(self) -> Iterator[McapRecord]:
         """Yield the records up to the end of the data, and read on to the end of the file, to see that it is there."""
@@ -158,8 +145,25 @@ class Contents:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
-    first: int = 0
+    first: int = LATEST
     last: int = 0
+    stated: Statistics | None = None  # by the file itself
+
+    @classmethod
+    def of(cls, records: Iterable[McapRecord]) -> Contents:
+        """Return what records tell: those of all data, or those of a summary."""
+        found = cls()
+        for record in records:
+            if isinstance(record, Schema):
+                found.schemas[record.id] = record
+            elif isinstance(record, Channel):
+                found.channels[record.id] = record
+            elif isinstance(record, Statistics):
+                found.stated = record
+            elif isinstance(record, Message):
+                found.counts[record.channel_id] = found.counts.get(record.channel_id, 0) + 1
+                found.first, found.last = min(found.first, record.log_time), max(found.last, record.log_time)
+        return found
 
 
 def stated_contents(path: Path) -> Contents | None:
@@ -172,41 +176,26 @@ def stated_contents(path: Path) -> Contents | None:
             return None
         try:
             (footer,) = _records(end)
-            if (
-                not isinstance(footer, Footer)
-                or not 0 < footer.summary_start < size
-                or size - footer.summary_start > _MOST
-            ):
+            start = footer.summary_start if isinstance(footer, Footer) else 0
+            if not 0 < start < size or size - start > _MOST:
                 return None
-            file.seek(footer.summary_start)
+            file.seek(start)
             summary = file.read()
             if footer.summary_crc != zlib.crc32(summary[: -len(_MAGIC) - _CRC]):
                 return None  # a sum that was not made is 0, and tells nothing either
-            return _contents(_records(summary))
-        except (McapError, ValueError, EOFError, LookupError, UnicodeDecodeError):
+            found = Contents.of(_records(summary))
+        except (McapError, ValueError, EOFError, LookupError):
             return None
+    schemas = {channel.schema_id for channel in found.channels.values()} - {0}
+    stated = found.stated
+    if stated is None or stated.channel_count != len(found.channels) or not schemas <= found.schemas.keys():
+        return None
+    counts = stated.channel_message_counts
+    if sum(counts.values()) != stated.message_count or not counts.keys() <= found.channels.keys():
+        return None
+    return replace(found, counts=counts, first=stated.message_start_time, last=stated.message_end_time)
 
 
 def _records(data: bytes) -> list[Any]:
     stream: Any = io.BytesIO(data)
     return list(StreamReader(stream, skip_magic=True, record_size_limit=len(data)).records)
-
-
-def _contents(records: list[Any]) -> Contents | None:
-    found, stated = Contents(), None
-    for record in records:
-        if isinstance(record, Schema):
-            found.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            found.channels[record.id] = record
-        elif isinstance(record, Statistics):
-            stated = record
-    if stated is None or stated.channel_count != len(found.channels):
-        return None
-    found.counts = stated.channel_message_counts
-    if sum(found.counts.values()) != stated.message_count or not found.counts.keys() <= found.channels.keys():
-        return None
-    if any(channel.schema_id and channel.schema_id not in found.schemas for channel in found.channels.values()):
-        return None
-    found.first, found.last = stated.message_start_time, stated.message_end_time
-    return found

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from kurumaisu.critic.values.recording import PARTS, Fan
+from kurumaisu.errors import Error
 from kurumaisu.plausible import yaw_or_nan
 
 COLUMNS = {
@@ -41,16 +42,14 @@ class ScanRow(NamedTuple):
     intensities: Any
 
 
-def converter(part: str, kind: str) -> Converter | None:
-    """Return the function from a message to its row for a part of a run, None where the type does not fit."""
+def converter(part: str, kind: str) -> Converter:
+    """Return the function from a message to its row for a part of a run. Raise Error for a type that does not fit."""
     if part not in PARTS:
         return lambda message: _numbers(message, MAIN_FIELD.get(kind, "data"))
-    return _CONVERTERS[part].get(kind)
-
-
-def accepted(part: str) -> list[str]:
-    """Return the message types that a part may have."""
-    return list(_CONVERTERS[part])
+    if kind not in _CONVERTERS[part]:
+        accepted = ", ".join(map(shown, _CONVERTERS[part]))
+        raise Error(_REFUSED.get(kind, f"is of type {shown(kind)}, not of {accepted}"))
+    return _CONVERTERS[part][kind]
 
 
 def serves_as(kind: str) -> list[str]:
@@ -58,9 +57,9 @@ def serves_as(kind: str) -> list[str]:
     return [part for part in PARTS if kind in _CONVERTERS[part]]
 
 
-def refusal(kind: str) -> str:
-    """Return why a message type that looks like a command is none, else ''."""
-    return _REFUSED.get(kind, "")
+def shown(kind: str) -> str:
+    """Return a type as ROS 1 writes it."""
+    return kind.replace("/msg/", "/")
 
 
 def _twist(message: Any) -> tuple[float, ...]:

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import opened
 from kurumaisu.critic.bags.limits import LATEST
 from kurumaisu.critic.bags.parts import parts_of
-from kurumaisu.critic.bags.topics import absolute, shown
+from kurumaisu.critic.bags.topics import absolute
 
 # What the names of topics say about what they are, the likelier first; a name that none fits is the least likely.
 _LIKELY = {
@@ -59,13 +60,12 @@ class Found:
 
 def survey(path: Path) -> list[Found]:
     """Return the topics of a bag, or of all parts of one that was split, by name. Raise Error naming a broken file."""
-    counts: dict[tuple[str, str], int] = {}
+    counts = Counter[tuple[str, str]]()
     start, end = LATEST, 0
     for bag in parts_of(path):
         with opened(bag) as opened_bag:
             for connection in opened_bag.connections:
-                key = absolute(connection.topic), shown(connection.msgtype)
-                counts[key] = counts.get(key, 0) + connection.msgcount
+                counts[absolute(connection.topic), messages.shown(connection.msgtype)] += connection.msgcount
             start, end = min(start, opened_bag.start_time), max(end, opened_bag.end_time)
     seconds = max((end - start) / 1e9, 1e-9)
     return [Found(name, kind, count, count / seconds) for (name, kind), count in sorted(counts.items())]

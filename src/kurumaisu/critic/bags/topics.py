@@ -15,7 +15,7 @@ from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from kurumaisu.critic.bags.containers import broken, opened
-from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.messages import ScanRow, shown
 from kurumaisu.critic.bags.parts import parts_of
 from kurumaisu.errors import Error, told
 from kurumaisu.types import BoolArray, FloatArray, IntArray
@@ -171,11 +171,6 @@ def decoder(path: Path, connection: Connection) -> Callable[[bytes], Any]:
         store.register({**known, **get_types_from_msg(connection.msgdef.data, kind)})
     decode = store.deserialize_ros1 if ros1 else store.deserialize_cdr
     return lambda data: decode(data, kind)
-
-
-def shown(kind: str) -> str:
-    """Return a type as ROS 1 writes it."""
-    return kind.replace("/msg/", "/")
 
 
 def _idl(text: str) -> Typesdict:

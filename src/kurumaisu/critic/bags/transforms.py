@@ -21,11 +21,9 @@ _TYPES = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 @dataclass
 class Edge:
-    """Transforms parent_from_child: stamps (n,) [ns], and rows (n, 7) of translation [m] and quaternion x, y, z, w."""
+    """Transforms of a frame in another: stamps (n,) [ns], rows (n, 7) of translation [m] and quaternion x, y, z, w."""
 
-    parent: str
-    child: str
-    fixed: bool
+    fixed: bool = True
     stamps: array[int] = field(default_factory=lambda: array("q"))
     numbers: array[float] = field(default_factory=lambda: array("d"))
 
@@ -49,7 +47,7 @@ def read_frame(path: Path, parent: str, child: str) -> tuple[FloatArray, FloatAr
     Raise Error naming the file, and the frames that there are, where no chain leads from one to the other.
     """
     chain = _chain(path, parent, child)
-    edges = {pair: Edge(*pair, fixed=True) for pair in chain}
+    edges = {pair: Edge() for pair in chain}
     for pair, stamp, row, fixed in _transforms(path):
         if pair in edges:
             edges[pair].fixed &= fixed
@@ -63,7 +61,7 @@ def read_frame(path: Path, parent: str, child: str) -> tuple[FloatArray, FloatAr
     times = times[(times >= max(start for start, _ in known)) & (times <= min(end for _, end in known))]
     total = np.repeat(np.eye(4)[None], len(times), axis=0)
     for pair in chain:
-        total = total @ (edges[pair].at(times))
+        total = total @ edges[pair].at(times)
     return times, np.stack([total[:, 0, 3], total[:, 1, 3], np.arctan2(total[:, 1, 0], total[:, 0, 0])], axis=1)
 
 

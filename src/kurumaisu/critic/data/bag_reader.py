@@ -12,9 +12,9 @@ import numpy as np
 
 from kurumaisu.critic.bags import messages
 from kurumaisu.critic.bags.containers import bag_name
-from kurumaisu.critic.bags.messages import ScanRow
+from kurumaisu.critic.bags.messages import ScanRow, serves_as, shown
 from kurumaisu.critic.bags.survey import Found, listed, proposal, survey
-from kurumaisu.critic.bags.topics import Convert, Topic, read_topics, shown
+from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
@@ -150,15 +150,12 @@ def read_bag_topics(
 
     def converter(part: str, kind: str) -> Convert:
         convert = messages.converter(part, kind)
-        if convert is None:
-            accepted = ", ".join(shown(name) for name in messages.accepted(part))
-            raise Error(messages.refusal(kind) or f"is of type {shown(kind)}, not of {accepted}")
         if part == "scan" and put_aside is not None:
             return lambda message: _aside(convert(message), put_aside)
         return convert
 
     def of_script(kind: str) -> Convert:
-        return messages.converter("command", kind) or (lambda _: None)
+        return messages.converter("command", kind) if "command" in serves_as(kind) else lambda _: None
 
     times = dict.fromkeys(also, lambda _: lambda _: ())
     parts = {topic: partial(converter, part) for part, topic in wanted.items()}

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.bags.topics import absolute, read_topics, shown
+from kurumaisu.critic.bags.messages import shown
+from kurumaisu.critic.bags.topics import absolute, read_topics
 from kurumaisu.critic.data.clean import HICCUP_SHARE, Faults
 from kurumaisu.critic.values.digits import moment, times
 from kurumaisu.critic.values.recording import Series
@@ -193,9 +194,7 @@ def _range(counts: FloatArray, whole: float) -> float:
     return float("inf")
 
 
-def _jumps(
-    wheels: Wheels, wheel: Wheel, around: FloatArray, size: float
-) -> tuple[BoolArray, BoolArray, BoolArray]:
+def _jumps(wheels: Wheels, wheel: Wheel, around: FloatArray, size: float) -> tuple[BoolArray, BoolArray, BoolArray]:
     """Return which steps are overflows, which may have gone either way, and which are no motion, (n - 1,) each.
 
     around: the steps, or the shorter way past the end of the range.

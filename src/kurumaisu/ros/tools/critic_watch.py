@@ -207,9 +207,7 @@ def _row(part: str, message: Any) -> Any:
         return (message.voltage,)
     if part == "temperature":
         return (message.temperature,)
-    convert = messages.converter(part, message._type.replace("/", "/msg/"))
-    assert convert is not None
-    return convert(message)
+    return messages.converter(part, message._type.replace("/", "/msg/"))(message)
 
 
 def _stamp(message: Any) -> float | None:
