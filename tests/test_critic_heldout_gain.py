@@ -35,6 +35,7 @@ from kurumaisu.critic.values.verdict import (
     Unknown,
     Verdict,
 )
+from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
 
 MODEL = load_model(shipped("launch/md100.yaml"))
@@ -206,12 +207,17 @@ def test_slam_goes_wrong_with_a_wrong_mounting_and_says_so(tmp_path: Path):
 def test_why_slam_was_not_compared_is_said(tmp_path, change, words):
     data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
     data = replace(data, runs=tuple(replace(run, **change) for run in data.runs))
-    assert words in slam_gain.measure(data, MODEL, lambda _: ()).sentence
+    with pytest.raises(Error, match=words):
+        slam_gain.measure(data, MODEL, lambda _: ())
 
 
 def test_scans_of_another_laser_are_no_reason_to_fail(tmp_path):
     data = make(Ask("null", design="drive", family="laser", regime="usual"), 3, tmp_path).null
-    assert "682" in slam_gain.measure(replace(data, laser=replace(data.laser, beams=681)), MODEL, lambda _: ()).sentence
+    data = replace(data, laser=replace(data.laser, beams=681))
+    larger = (EffectSetting("laser.scale", {"scale": 0.02}),)
+    told = with_slam(bare(), data, Extension(None, larger, lambda _: ())).story.details[-1]
+    assert told.startswith("SLAM not compared: ")
+    assert "682" in told
 
 
 def test_slam_gets_the_stamps_of_a_clock_that_runs_fast_since_the_run_began(tmp_path):

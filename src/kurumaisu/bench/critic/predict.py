@@ -107,19 +107,6 @@ def _withheld(recording: Recording, rng: np.random.Generator) -> tuple[Recording
     return replace(recording, runs=(*recording.runs[:_HELD], test), train=train, test=(run.name,)), np.array(truth)
 
 
-class _Truth:
-    """Paths of somebody who knows what is hidden."""
-
-    def __init__(self, times: FloatArray, poses: FloatArray) -> None:
-        self._times, self._poses = times, poses
-
-    def at(
-        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
-    ) -> tuple[FloatArray, list[FloatArray]]:
-        """Return the poses to be expected at times."""
-        return geometry.interpolate(self._times, self._poses, times), []
-
-
 def _oracle(case: Case, run: Run) -> list[tuple[FloatArray, FloatArray]]:
     """Return the oracle's means and sds: the increments to be expected by the generator, and its noise."""
     assert case.known is not None
@@ -127,6 +114,11 @@ def _oracle(case: Case, run: Run) -> list[tuple[FloatArray, FloatArray]]:
     whole = case.recording.runs[_HELD].pose
     assert whole is not None
     drive = prepare_all(run, load_model(shipped("launch/md100.yaml")), float(run.queries.max()))
-    paths, noise = _Truth(whole.t, case.known.poses[_HELD]), noise_of(case.known.regime)
-    made = [motion_ahead(drive, paths, noise, t0, t1) for t0, t1 in run.queries.tolist()]
-    return [(one.mean, one.sds) for one in made]
+    times, poses, noise = whole.t, case.known.poses[_HELD], noise_of(case.known.regime)
+
+    def expected(_: Drive, at: FloatArray, past: Sequence[int]) -> tuple[FloatArray, list[FloatArray]]:
+        """Return where somebody who knows what is hidden expects the chair."""
+        return geometry.interpolate(times, poses, at), []
+
+    made = [motion_ahead(drive, expected, noise, t0, t1) for t0, t1 in run.queries.tolist()]
+    return [(mean, np.sqrt(np.diag(covariance))) for mean, covariance in made]

@@ -139,25 +139,11 @@ def _spread(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class Option:
-    """An experiment with its expected log evidence [nat] for the truth over its rivals, all and per pair (h, h)."""
-
-    script: Script
-    nats: float
-    expected_nats: float
-    pairs: FloatArray
-
-
-@dataclass(frozen=True)
 class Proposal:
-    """The experiment to run next, None where nothing is to be separated or nothing would; a sentence for the report.
-
-    options: all that were weighed, best first.
-    """
+    """The experiment to run next, None where nothing is to be separated or nothing would; a sentence for the report."""
 
     experiment: NextExperiment | None = None
     sentence: str = ""
-    options: tuple[Option, ...] = ()
 
 
 def drives() -> tuple[Script, ...]:
@@ -173,20 +159,19 @@ def propose(problem: Problem, found: SearchResult, scripts: Sequence[Script]) ->
     open_ids = sorted(frozenset.union(*(f.ids for f in fits)) - frozenset.intersection(*(f.ids for f in fits)))
     rivals = [Explanation(f.terms, f.values, doubt(problem, f.terms, f.values)) for f in fits]
     able = [script for script in scripts if possible(script, problem.model)]
-    options = [_option(problem, script, fits[0], rivals, weights) for script in able]
-    options.sort(key=lambda option: -option.expected_nats / option.script.seconds)
+    worth = [_expected(problem, script, fits[0], rivals, weights) for script in able]
     listed = _listed(open_ids)
-    if not options or max(option.nats for option in options) < NOTHING:
+    if max((nats for nats, _ in worth), default=0.0) < NOTHING:
         asked = any(issubclass(effects.by_id(name), ReferenceEffect) for name in open_ids)
         other = "scans of a known map tell what the reference measures" if asked else "measure it in another way"
-        return Proposal(None, f"No scripted drive can decide whether {listed} acts: {other}.", ())
-    best = options[0]
-    experiment = NextExperiment(best.script.name, best.script.seconds, best.nats, tuple(open_ids))
+        return Proposal(None, f"No scripted drive can decide whether {listed} acts: {other}.")
+    i = max(range(len(able)), key=lambda i: worth[i][1] / able[i].seconds)
+    best, nats = able[i], worth[i][0]
     sentence = (
-        f"critic experiment {best.script.name} ({best.script.seconds:.0f} s). It should make the true explanation "
-        f"{odds(best.nats)} times as probable as a false one; in question: {listed}."
+        f"critic experiment {best.name} ({best.seconds:.0f} s). It should make the true explanation {odds(nats)} times "
+        f"as probable as a false one; in question: {listed}."
     )
-    return Proposal(experiment, sentence, tuple(options))
+    return Proposal(NextExperiment(best.name, best.seconds, nats, tuple(open_ids)), sentence)
 
 
 def remaining(found: SearchResult) -> tuple[list[Fit], FloatArray]:
@@ -210,13 +195,17 @@ def _listed(ids: Sequence[str]) -> str:
     return " or ".join([", ".join(told[:-1]), told[-1]] if len(told) > 1 else told)
 
 
-def _option(
+def _expected(
     problem: Problem, script: Script, likeliest: Fit, rivals: Sequence[Explanation], weights: FloatArray
-) -> Option:
+) -> tuple[float, float]:
+    """Return the expected log evidence [nat] of a script for the truth over its rivals, whole, and what of it decides.
+
+    Beyond DECIDED nothing more is decided between two.
+    """
     drive = planned(script, problem.model, likeliest.settings)
     said = [predict(drive, problem.model, problem.noise, rival) for rival in rivals]
     pairs = np.array([[divergence(a, b) if a is not b else 0.0 for b in said] for a in said])
     # The truth is each of them with its posterior; the rival it has to beat is each other one, likewise.
     chance = np.outer(weights, weights) * (1 - np.eye(len(weights)))
     chance /= chance.sum()
-    return Option(script, float((chance * pairs).sum()), float((chance * np.minimum(pairs, DECIDED)).sum()), pairs)
+    return float((chance * pairs).sum()), float((chance * np.minimum(pairs, DECIDED)).sum())

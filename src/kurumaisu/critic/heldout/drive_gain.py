@@ -86,7 +86,9 @@ def measure(model: Model, splits: Sequence[Fold], refit: Refit, baseline: Noise,
             for horizon, floor in _squares_by_noise(drive, model, extension.settings, extended):
                 floors[horizon].append(floor)
             for side, (fitted, noise) in enumerate(((FittedExtension(()), baseline), (extension, extended))):
-                density[side].extend(blocks(drive, _log_density(drive, model, fitted, noise)))
+                density[side].extend(
+                    blocks(_log_density(drive, model, fitted, noise), drive.times[1:] - drive.times[0])
+                )
                 for horizon in HORIZONS:
                     errors[horizon][side].extend(_open_loop(drive, model, fitted.settings, horizon))
     rmse = {
@@ -144,9 +146,9 @@ def _surprise(innovations: FloatArray, columns: FloatArray) -> FloatArray:
     return out
 
 
-def blocks(drive: Drive, values: FloatArray) -> list[FloatArray]:
-    """Return per-increment values cut into blocks of BLOCK seconds."""
-    index = ((drive.times[1:] - drive.times[0]) // BLOCK).astype(int)
+def blocks(values: FloatArray, since: FloatArray, length: float = BLOCK) -> list[FloatArray]:
+    """Return values (n, ...) cut into blocks of so many seconds; since (n,) [s]: when each is, since the beginning."""
+    index = (since // length).astype(int)
     return [values[index == i] for i in np.unique(index)]
 
 
@@ -158,13 +160,12 @@ def _open_loop(drive: Drive, model: Model, settings: Sequence[EffectSetting], ho
     measured = geometry.between(drive.poses[starts], drive.poses[ends])
     squares = np.square(predicted - measured)
     squares[:, 2] = np.square(geometry.wrap(predicted[:, 2] - measured[:, 2]))
-    index = ((drive.times[starts] - drive.times[0]) // max(BLOCK, horizon)).astype(int)
-    return [squares[index == i] for i in np.unique(index)]
+    return blocks(squares, drive.times[starts] - drive.times[0], max(BLOCK, horizon))
 
 
 def _drawn(baseline: list[FloatArray], extended: list[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Return sums of both sides and counts of blocks (m, 3), and the same (_DRAWS, 3) of blocks drawn again."""
-    sums = np.array([[b.sum(), e.sum(), len(b)] for b, e in zip(baseline, extended, strict=True)])
+    sums = np.array([[b.sum(), e.sum(), b.size] for b, e in zip(baseline, extended, strict=True)])
     weights = np.random.default_rng(0).multinomial(len(sums), np.full(len(sums), 1 / len(sums)), size=_DRAWS)
     return sums, weights.astype(np.float64) @ sums
 
@@ -200,5 +201,6 @@ def _squares_by_noise(
         for i in few:
             row = slice(starts[i], starts[i] + 1)
             alone = drive.seen_at(drive.times[row], drive.poses[row])
-            ahead = motion_ahead(alone, paths, noise, float(drive.times[starts[i]]), float(drive.times[ends[i]]))
-            yield horizon, float(ahead.covariance[0, 0] + ahead.covariance[1, 1])
+            begin, end = float(drive.times[starts[i]]), float(drive.times[ends[i]])
+            _, covariance = motion_ahead(alone, paths.at, noise, begin, end)
+            yield horizon, float(covariance[0, 0] + covariance[1, 1])

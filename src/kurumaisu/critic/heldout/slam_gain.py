@@ -15,7 +15,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import driven, prepare_all
 from kurumaisu.critic.heldout import scan_gain
-from kurumaisu.critic.heldout.drive_gain import BLOCK, rmse_gain
+from kurumaisu.critic.heldout.drive_gain import blocks, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.predict.scan_poses import ScanPoses, joined
 from kurumaisu.critic.ranges.scans.beams import acts_on_readings
@@ -42,17 +42,8 @@ _ROUNDS = 4  # of an inversion whose error falls by the effects' relative size e
 
 
 @dataclass(frozen=True)
-class Downstream:
-    """gain, picture: None where SLAM was not run, for the reason told; paths in the reference's frame."""
-
-    sentence: str
-    gain: SlamGain | None = None
-    picture: Overlay | None = None
-
-
-@dataclass(frozen=True)
 class _Path:
-    """Times (n,) [s], the reference (n, 3), poses (n, 3) in its frame by the first seed; squares (seeds, n, 2)."""
+    """Times (n,) [s], the reference (n, 3), poses (n, 3) in its frame by the first seed; squares (n, seeds, 2)."""
 
     times: FloatArray
     truth: FloatArray
@@ -60,18 +51,12 @@ class _Path:
     squares: FloatArray
 
 
-def measure(recording: Recording, model: Model, refit: Refit) -> Downstream:
-    """Return the error of SLAM's path on a run held out, with the model as it was and with what extends it."""
+def measure(recording: Recording, model: Model, refit: Refit) -> tuple[SlamGain, Overlay]:
+    """Return the error of SLAM's path on a run held out, with the model as it was and with what extends it; a picture.
+
+    Its paths are in the reference's frame. Raise Error saying why SLAM cannot be run.
+    """
     run = _chosen(recording)
-    if run is None:
-        return Downstream(f"SLAM not compared: {_missing(recording)}.")
-    try:
-        return _compared(recording, run, model, refit)
-    except Error as error:  # a verdict is worth more than what it is worth downstream
-        return Downstream(f"SLAM not compared: {error}.")
-
-
-def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Downstream:
     assert run.scan is not None
     assert run.pose is not None
     beams = laser_of(model.laser, recording.laser, recording.runs).beams
@@ -85,12 +70,11 @@ def _compared(recording: Recording, run: Run, model: Model, refit: Refit) -> Dow
         sides.append(_mapped(log, run.pose))
     gains = []
     for i, unit in enumerate(("m", "rad")):
-        blocks = [_blocks(side, i) for side in sides]
-        gains.append(rmse_gain(blocks[0], blocks[1], unit))
-    gain = SlamGain(run.name, len(sides[0].times), *gains)
+        before, after = (blocks(side.squares[:, :, i], side.times - side.times[0]) for side in sides)
+        gains.append(rmse_gain(before, after, unit))
     measured, before, after = (path[:, :2] for path in (sides[0].truth, sides[0].poses, sides[1].poses))
     picture = Overlay(f"SLAM on {run.name}", measured, before, after, run.name in recording.test, restart=0.0)
-    return Downstream(sentence(gain), gain, picture)
+    return SlamGain(run.name, len(sides[0].times), *gains), picture
 
 
 def sentence(gain: SlamGain) -> str:
@@ -107,11 +91,13 @@ def sentence(gain: SlamGain) -> str:
     return f"{text}: {'no improvement' if worse else 'no significant difference in this run'}."
 
 
-def _chosen(recording: Recording) -> Run | None:
-    """Return the run with most scans that can be mapped, of those to judge by or else of all."""
+def _chosen(recording: Recording) -> Run:
+    """Return the run with most scans that can be mapped, of those to judge by or else of all. Raise Error for none."""
     names = recording.test or recording.train
     able = [run for run in recording.runs if run.name in names and driven(run) and len(_rows(run)) >= FEWEST]
-    return max(able, key=lambda run: len(_rows(run)), default=None)
+    if not able:
+        raise Error(_missing(recording))
+    return max(able, key=lambda run: len(_rows(run)))
 
 
 def _missing(recording: Recording) -> str:
@@ -165,12 +151,7 @@ def _mapped(log: ScanLog, reference: Series) -> _Path:
         off = placed - truth
         squares.append(np.column_stack([(off[:, :2] ** 2).sum(axis=1), geometry.wrap(off[:, 2]) ** 2]))
         aligned.append(placed)
-    return _Path(log.times, truth, aligned[0], np.array(squares))
-
-
-def _blocks(side: _Path, column: int) -> list[FloatArray]:
-    index = ((side.times - side.times[0]) // BLOCK).astype(int)
-    return [side.squares[:, index == i, column].ravel() for i in np.unique(index)]
+    return _Path(log.times, truth, aligned[0], np.stack(squares, axis=1))
 
 
 @dataclass(frozen=True)
@@ -291,12 +272,15 @@ def with_slam(criticism: Criticism, recording: Recording, extension: Extension) 
     verdict, story = criticism.verdict, criticism.story
     if extension.empty or verdict.gain is None:
         return criticism
-    seen = measure(recording, criticism.model, lambda name: _without(name, criticism, recording, extension))
-    told = replace(story, details=(*story.details, seen.sentence))
-    if seen.gain is None or seen.picture is None:
-        return replace(criticism, story=told)
-    whole = replace(verdict, gain=replace(verdict.gain, slam=seen.gain))
-    return replace(criticism, verdict=whole, story=replace(told, overlays=(seen.picture, *story.overlays)))
+    try:
+        gain, picture = measure(
+            recording, criticism.model, lambda name: _without(name, criticism, recording, extension)
+        )
+    except Error as error:  # a verdict is worth more than what it is worth downstream
+        return replace(criticism, story=replace(story, details=(*story.details, f"SLAM not compared: {error}.")))
+    whole = replace(verdict, gain=replace(verdict.gain, slam=gain))
+    told = replace(story, details=(*story.details, sentence(gain)), overlays=(picture, *story.overlays))
+    return replace(criticism, verdict=whole, story=told)
 
 
 def _without(name: str, criticism: Criticism, recording: Recording, extension: Extension) -> Settings:

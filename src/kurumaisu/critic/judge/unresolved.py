@@ -184,7 +184,7 @@ def least_variance(problem: Problem, drives: Sequence[Drive]) -> float:
     for drive in drives:
         left = (drive.measured - problem.simulated(drive, ())).reshape(-1, 1)
         white = problem.whitened(drive, left).reshape(-1, 3)
-        blocks += [(block**2).ravel() for block in drive_gain.blocks(drive, white)]
+        blocks += [(block**2).ravel() for block in drive_gain.blocks(white, drive.times[1:] - drive.times[0])]
     if len(blocks) < 2:
         return 0.0
     sums = np.array([[block.sum(), len(block)] for block in blocks])

@@ -8,9 +8,8 @@ of the rates is doing at t0 is known in the same way, and goes on for some time 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -43,40 +42,22 @@ class Forecast:
     others: tuple[Settings, ...] = ()
 
 
-@dataclass(frozen=True)
-class Ahead:
-    """Motion from t0 to t1 [s] in the body frame at t0: mean (3,) and its covariance (3, 3) [m, m, rad]."""
-
-    t0: float
-    t1: float
-    mean: FloatArray
-    covariance: FloatArray
-
-    @property
-    def sds(self) -> FloatArray:
-        """Standard deviations, (3,)."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+# From a drive, times (n,) [s], and rows of its poses that may be used: poses (n, 3) at those times by a model, in a
+# frame of its own, and as many by each other one.
+Way = Callable[[Drive, FloatArray, Sequence[int]], tuple[FloatArray, list[FloatArray]]]
 
 
-class Known(Protocol):
-    """What is known of the way: Paths, or what stands in for them."""
+def motion_ahead(drive: Drive, way: Way, noise: Noise, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+    """Return the motion from t0 to t1 [s] in the body frame at t0: mean (3,) and covariance (3, 3) [m, m, rad].
 
-    def at(
-        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
-    ) -> tuple[FloatArray, list[FloatArray]]:
-        """Return poses (n, 3) at times, and as many by each other model."""
-
-
-def motion_ahead(drive: Drive, paths: Known, noise: Noise, t0: float, t1: float) -> Ahead:
-    """Return the motion from t0 to t1; drive: all its poses, of which those after t0 are not used.
-
-    paths: what the reference would see of the model, on the drive's inputs up to t1 at least.
+    drive: all its poses, of which those after t0 are not used. way: what the reference would see of the model, on the
+    drive's inputs up to t1 at least.
     """
     past = _past(drive, noise, t0)
     last = float(drive.times[past[-1]]) if len(past) else t0
     knots = _knots(last, t0, t1)
     times = np.concatenate([drive.times[past[:-1]], knots])
-    sim, others = paths.at(drive, times, past, t0)
+    sim, others = way(drive, times, past)
     steps = geometry.between(sim[:-1], sim[1:])
     turned = [geometry.between(other[:-1], other[1:]) - steps for other in others]
     start = drive.poses[past[-1]] if len(past) else np.zeros(3)
@@ -87,7 +68,7 @@ def motion_ahead(drive: Drive, paths: Known, noise: Noise, t0: float, t1: float)
     error[:, 2] = geometry.wrap(error[:, 2])  # across a gap nobody counted the turns
     mean, covariance = _conditional(drive, times, poses, error, turned, noise)
     begin = int(np.argmin(np.abs(times[here:] - t0)))  # steps before it lead from the last pose to t0
-    return _composed(t0, t1, steps[here:] + mean, covariance, begin)
+    return _composed(steps[here:] + mean, covariance, begin)
 
 
 def _past(drive: Drive, noise: Noise, t0: float) -> list[int]:
@@ -139,7 +120,7 @@ def _conditional(
     return mean.reshape(-1, 3), np.asarray(covariance)
 
 
-def _composed(t0: float, t1: float, steps: FloatArray, covariance: FloatArray, begin: int) -> Ahead:
+def _composed(steps: FloatArray, covariance: FloatArray, begin: int) -> tuple[FloatArray, FloatArray]:
     """Return the motion that steps (f, 3) from `begin` on add up to, their covariance carried along to first order."""
     places = [np.zeros(3)]
     for step in steps[begin:]:
@@ -151,7 +132,7 @@ def _composed(t0: float, t1: float, steps: FloatArray, covariance: FloatArray, b
         c, s = np.cos(before[2]), np.sin(before[2])
         rest = end - after  # swings with the turn of this step
         carried[:, 3 * i : 3 * i + 3] = [[c, -s, -rest[1]], [s, c, rest[0]], [0, 0, 1]]
-    return Ahead(t0, t1, end, np.asarray(carried @ covariance @ carried.T))
+    return end, np.asarray(carried @ covariance @ carried.T)
 
 
 class Paths:
@@ -176,9 +157,7 @@ class Paths:
             self._base = self._run(seen, settings)
             self._others = [self._run(seen, other) for other in others]
 
-    def at(
-        self, drive: Drive, times: FloatArray, past: Sequence[int], t0: float
-    ) -> tuple[FloatArray, list[FloatArray]]:
+    def at(self, drive: Drive, times: FloatArray, past: Sequence[int]) -> tuple[FloatArray, list[FloatArray]]:
         """Return poses (n, 3) at times by the model, in a frame of its own, and as many by each other one.
 
         past: rows of the drive's poses, none after t0, that may be used.

@@ -56,8 +56,11 @@ def motions_of(run: Run, forecast: Forecast | None, queries: FloatArray) -> list
         return []
     drive = with_covariates_but_place(prepare_all(run, forecast.model, float(queries.max())), run)
     paths = Paths(drive, forecast.model, forecast.settings, forecast.others)
-    ahead = (motion_ahead(drive, paths, forecast.noise, t0, t1) for t0, t1 in queries.tolist())
-    return [Prediction(run.name, one.t0, one.t1, one.mean, one.sds) for one in ahead]
+    made = []
+    for t0, t1 in queries.tolist():
+        mean, covariance = motion_ahead(drive, paths.at, forecast.noise, t0, t1)
+        made.append(Prediction(run.name, t0, t1, mean, np.sqrt(np.diag(covariance))))
+    return made
 
 
 def ranges(recording: Recording, model: Model, forecast: Forecast | None, settings: Settings) -> Iterator[Prediction]:

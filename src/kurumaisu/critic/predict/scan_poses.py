@@ -87,14 +87,14 @@ def _around(drive: Drive, paths: Paths, forecast: Forecast, stamp: float) -> Tra
     if row < 0:
         return Track(drive.times, drive.poses, (forecast.noise.position_sd, forecast.noise.heading_sd))
     last = float(drive.times[row])
-    ahead = motion_ahead(drive, paths, forecast.noise, last, max(stamp, last + _AFTER))
-    there = geometry.compose(drive.poses[row], ahead.mean)
+    mean, covariance = motion_ahead(drive, paths.at, forecast.noise, last, max(stamp, last + _AFTER))
+    there = geometry.compose(drive.poses[row], mean)
     times = stamp + _AROUND
-    sim = paths.at(drive, times, [row], stamp)[0]
+    sim = paths.at(drive, times, [row])[0]
     middle = int(np.argmin(np.abs(_AROUND)))
     poses = geometry.compose(np.broadcast_to(there, sim.shape), geometry.between(sim[middle], sim))
     white = np.square([forecast.noise.position_sd, forecast.noise.position_sd, forecast.noise.heading_sd])
-    return Track(times, poses, _doubt(ahead.covariance - np.diag(white), forecast.noise))
+    return Track(times, poses, _doubt(covariance - np.diag(white), forecast.noise))
 
 
 def _doubt(covariance: FloatArray, noise: Noise) -> tuple[float, float]:
