@@ -6,6 +6,7 @@ from __future__ import annotations
 import shutil
 import time
 import unicodedata
+from collections.abc import Sequence
 from typing import TextIO
 
 from kurumaisu.critic.app.job import Outcome
@@ -37,6 +38,18 @@ def cut(text: str, most: int) -> str:
             break
         kept.append(c)
     return "".join(kept) + "…" * (most > 0)
+
+
+def aligned(rows: Sequence[Sequence[str]], right: int = -1) -> list[str]:
+    """Return a line for each row, whose cells begin below each other; those of column `right` end below each other."""
+    shown = [[printable(cell) for cell in row] for row in rows]
+    widths = [max(cells(cell) for cell in column) for column in zip(*shown, strict=True)]
+
+    def padded(cell: str, column: int) -> str:
+        gap = " " * (widths[column] - cells(cell))
+        return gap + cell if column == right else cell + gap
+
+    return ["  ".join(padded(cell, i) for i, cell in enumerate(row)).rstrip() for row in shown]
 
 
 def _cells(c: str) -> int:

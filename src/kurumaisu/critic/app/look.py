@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kurumaisu import program
-from kurumaisu.critic.app.display import cells, printable
+from kurumaisu.critic.app.display import aligned, printable
 from kurumaisu.critic.app.options import add_robot, add_span, name_list
 from kurumaisu.critic.bags.containers import is_bag
 from kurumaisu.critic.bags.messages import shown
@@ -141,7 +141,7 @@ def _topics(source: Path, meta: Meta) -> Generator[str, None, dict[str, Topic]]:
             could = could or ["could be wheels"] * (topic.type == shown(JOINTS))
             role = f"is {roles[topic.name]}" if topic.name in roles else ", ".join(could)
             rows.append((topic.name, topic.type, str(topic.count), *told, role))
-        yield from _table(rows)
+        yield from (f"  {line}" for line in aligned(rows))
         yield from (f"  meta.yaml could say  {words}" for words in mappings(found, meta))
     return topics
 
@@ -163,14 +163,7 @@ def _parts(run: Run) -> Iterator[str]:
     for name, series in {**run.parts(), **run.covariates}.items():
         rate, gaps, _ = _timing(series.t)
         rows.append((name, str(len(series.t)), f"{series.t[0]:.3f} s", f"{series.t[-1]:.3f} s", rate, gaps))
-    yield from _table(rows)
-
-
-def _table(rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
-    widths = [max(cells(printable(row[i])) for row in rows) for i in range(len(rows[0]))]
-    for row in rows:
-        padded = (cell + " " * (width - cells(printable(cell))) for cell, width in zip(row, widths, strict=True))
-        yield f"  {'  '.join(padded)}".rstrip()
+    yield from (f"  {line}" for line in aligned(rows))
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -3,15 +3,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 
-from kurumaisu.critic.app.display import cells, cut, printable
+from kurumaisu.critic.app.display import aligned, cut, printable
 from kurumaisu.critic.app.job import Outcome
+from kurumaisu.critic.data.csv_reader import csv_text
 from kurumaisu.critic.values.digits import bare, quantities
 from kurumaisu.critic.values.verdict import Gain, Verdict, grouped, to_json
 from kurumaisu.errors import Error
@@ -101,26 +100,17 @@ def table(outcomes: Sequence[Outcome], width: int) -> str:
         told = "" if gain is None else f"{gain.log_density_per_sample.gain:+.3f}"
         rows.append((outcome.job.name, outcome.word, told, _what(outcome)))
     longest = max(width // 3, _NARROWEST)
-    rows = [(cut(printable(a), longest), printable(b), printable(c), printable(d)) for a, b, c, d in rows]
-    widths = [max(cells(row[i]) for row in rows) for i in range(3)]
-    lines = []
-    for row in rows:
-        gap = [" " * (most - cells(cell)) for most, cell in zip(widths, row[:3], strict=True)]
-        line = f"{row[0]}{gap[0]}  {row[1]}{gap[1]}  {gap[2]}{row[2]}  {row[3]}"
-        lines.append(cut(line.rstrip(), width))
+    lines = aligned([(cut(printable(name), longest), *others) for name, *others in rows], right=2)
     words = [outcome.word for outcome in outcomes]
     counts = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(sorted(words)))
-    return "\n".join([*lines, f"{len(outcomes)} recordings: {counts}"])
+    return "\n".join([*(cut(line, width) for line in lines), f"{len(outcomes)} recordings: {counts}"])
 
 
 def write_table(path: Path, outcomes: Sequence[Outcome]) -> None:
     """Write a CSV table, one row for each outcome, whole or not at all. Raise Error when it cannot be written."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, COLUMNS, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_row(outcome) for outcome in outcomes)
+    rows = [_row(outcome) for outcome in outcomes]
     try:
-        write_whole({path: text.getvalue()})
+        write_whole({path: csv_text(COLUMNS, ([row.get(name, "") for name in COLUMNS] for row in rows))})
     except Error as error:
         raise Error(f"--table: {error}") from error
 

@@ -93,15 +93,12 @@ class OldRos1Bag:
         """Forget the topics."""
         self.connections = []
 
-    def messages(
-        self, connections: Collection[Connection], start: int | None = None, stop: int | None = None
-    ) -> Iterator[tuple[Connection, int, bytes]]:
-        """Yield connection, time of receipt [ns] and data, in the order of the file, from start until before stop."""
+    def messages(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, time of receipt [ns] and data, in the order of the file."""
         wanted = {connection.topic: connection for connection in connections}
-        first, last = start or 0, LATEST if stop is None else stop
         for header, data in self._records(messages=True):
             topic = normalize(header.get_string("topic"))
-            if header.get_uint8("op") == _MESSAGE and topic in wanted and first <= _received(header) < last:
+            if header.get_uint8("op") == _MESSAGE and topic in wanted:
                 yield wanted[topic], _received(header), data
 
     def _records(self, *, messages: bool) -> Iterator[tuple[Header, bytes]]:

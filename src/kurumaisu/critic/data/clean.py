@@ -72,9 +72,11 @@ def clean(table: Table, faults: Faults, *, ranges: bool = False) -> Series | Non
     ranges: values are laser ranges, for which nan and inf have a meaning; any other value must be finite.
     """
     keep = np.isfinite(table.t) & (ranges | np.isfinite(table.values).all(axis=1))
-    _report(table, ~keep, faults, "not a number: dropped", "has no number in most rows", 0.5)
+    _report(table, np.flatnonzero(~keep), faults, "not a number: dropped", "has no number in most rows", 0.5)
     sane = _of_sane_size(table, ranges=ranges)
-    _report(table, keep & ~sane, faults, "too large to be true: dropped", "has numbers too large to be true")
+    _report(
+        table, np.flatnonzero(keep & ~sane), faults, "too large to be true: dropped", "has numbers too large to be true"
+    )
     kept = np.flatnonzero(keep & sane)
     kept = kept[~_stamp_outliers(table, kept, faults)]
     kept = kept[~_repeated(table, kept, faults)]
@@ -127,28 +129,24 @@ def _stamp_outliers(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     return outliers
 
 
-def _report(table: Table, bad: BoolArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:
-    count = int(bad.sum())
-    if count:
-        faults.add(f"{table.where}: {_rows(count)} {noted} (first: {table.place(int(np.argmax(bad)))})")
-    if count > share * len(bad):
-        faults.add(f"{table.where}: {fatal} ({count} of {len(bad)})", fatal=True)
+def _report(table: Table, bad: IntArray, faults: Faults, noted: str, fatal: str, share: float = HICCUP_SHARE) -> None:
+    """Say which rows are bad, (k,), and that nothing can be trusted where they are more than a share of all."""
+    if len(bad):
+        faults.add(f"{table.where}: {_rows(len(bad))} {noted} (first: {table.place(int(bad[0]))})")
+    if len(bad) > share * len(table.t):
+        faults.add(f"{table.where}: {fatal} ({len(bad)} of {len(table.t)})", fatal=True)
 
 
 def _repeated(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     """Return which of the kept rows repeat the time of an earlier one, (k,)."""
-    order = kept[np.argsort(table.t[kept], kind="stable")]
-    t = table.t[order]
-    starts = np.r_[True, np.diff(t) > 0] if len(t) else np.zeros(0, dtype=bool)
-    first = order[np.maximum.accumulate(np.where(starts, np.arange(len(t)), 0))]
-    a, b = table.values[order], table.values[first]
+    _, first, group = np.unique(table.t[kept], return_index=True, return_inverse=True)
+    origin = kept[first[group]]
+    a, b = table.values[kept], table.values[origin]
     equal = ((a == b) | (np.isnan(a) & np.isnan(b))).all(axis=1)
-    same, conflict = np.zeros(len(table.t), dtype=bool), np.zeros(len(table.t), dtype=bool)
-    same[order] = ~starts & equal
-    conflict[order] = ~starts & ~equal
-    _report(table, same, faults, "repeated: the first is kept", "repeats its rows: drop the copies")
+    repeated = np.asarray(kept != origin)
+    _report(table, kept[repeated & equal], faults, "repeated: the first is kept", "repeats its rows: drop the copies")
+    conflict = kept[repeated & ~equal]
     _report(table, conflict, faults, "at a time already given: the first is kept", "has different rows for one time")
-    repeated: BoolArray = (same | conflict)[kept]
     return repeated
 
 
@@ -170,9 +168,7 @@ def _of_wrong_order(table: Table, kept: IntArray, faults: Faults) -> BoolArray:
     around = np.r_[np.inf, t[2:] - t[:-2], np.inf][: len(t)]
     alone = ~(np.r_[False, moved[:-1]] | np.r_[moved[1:], False])
     wrong[moved] = ~late & (alone & (around > 2 * HOLE * usual))[moved]
-    _report(
-        table, np.isin(np.arange(len(table.t)), kept[wrong]), faults, "stamped out of turn: dropped", "is out of turn"
-    )
+    _report(table, kept[wrong], faults, "stamped out of turn: dropped", "is out of turn")
     back = np.flatnonzero(np.diff(t[~wrong]) < 0)
     if not len(back):
         return wrong

@@ -62,22 +62,21 @@ def _ended(command: Series, hold: float) -> Series:
 
 
 def _guide(run: Run) -> Guide | None:
-    """Return what says best how a robot turned, and whether it drove ahead."""
-    plain = _guide_without_imu(run)
-    if run.imu is None or plain is None:
-        return plain
-    return Guide("the imu", run.imu.t, heading(run.imu), plain.speeds(run.imu.t), steady=True)
-
-
-def _guide_without_imu(run: Run) -> Guide | None:
+    """Return what says best how a robot turned, and whether it drove ahead: an imu knows nothing of that by itself."""
     if run.odom is not None:
-        return Guide("the odometry", run.odom.t, run.odom.column("theta"), run.odom.column("v"))
-    if run.command is None:
+        plain = Guide("the odometry", run.odom.t, run.odom.column("theta"), run.odom.column("v"))
+    elif run.command is not None:
+        # Held until the next, as rows between which they change evenly.
+        t = np.repeat(run.command.t, 2)[1:]
+        rates = np.repeat(np.column_stack([run.command.column("v"), run.command.column("w")]), 2, axis=0)[:-1]
+        plain = Guide("the commands", t, driven_by(t, rates)[:, 2], rates[:, 0])
+    else:
         return None
-    # Held until the next, as rows between which they change evenly.
-    t = np.repeat(run.command.t, 2)[1:]
-    rates = np.repeat(np.column_stack([run.command.column("v"), run.command.column("w")]), 2, axis=0)[:-1]
-    return Guide("the commands", t, driven_by(t, rates)[:, 2], rates[:, 0])
+    return (
+        plain
+        if run.imu is None
+        else Guide("the imu", run.imu.t, heading(run.imu), plain.speeds(run.imu.t), steady=True)
+    )
 
 
 @dataclass(frozen=True)
@@ -109,10 +108,10 @@ def with_headings(positions: Series, guide: Guide | None) -> tuple[Series, float
     way = max(_SHORTEST, _NOISES * _noise(places))
     theta = np.zeros(len(t)) if guide is None else np.interp(t, guide.t, guide.theta)
     ahead = np.ones(len(t)) if guide is None else np.sign(guide.speeds(t))
-    found = [
-        ((t[i] + t[j]) / 2, _course(places[j] - places[i], ahead[i]) - theta[i : j + 1].mean())
-        for i, j in _ways(t, places, theta, ahead, way)
-    ]
+    found = []
+    for i, j in _ways(t, places, theta, ahead, way):
+        x, y = ahead[i] * (places[j] - places[i])
+        found.append(((t[i] + t[j]) / 2, np.arctan2(y, x) - theta[i : j + 1].mean()))
     if len(found) < 2:
         raise Error(f"has positions without headings, and no two ways of {way:.2g} m to tell headings from")
     times, offsets = np.array(found).T
@@ -153,10 +152,6 @@ def _noise(places: FloatArray) -> float:
         return 0.0
     off = places[1:-1] - (places[:-2] + places[2:]) / 2
     return float(SIGMA_PER_MAD * np.median(np.abs(off - np.median(off, axis=0))) / np.sqrt(1.5))
-
-
-def _course(step: FloatArray, ahead: float) -> float:
-    return float(np.arctan2(step[1], step[0]) + (np.pi if ahead < 0 else 0.0))
 
 
 def _ways(t: FloatArray, places: FloatArray, theta: FloatArray, ahead: FloatArray, way: float) -> list[tuple[int, int]]:

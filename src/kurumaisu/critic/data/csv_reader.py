@@ -79,7 +79,9 @@ def read_csv_run(folder: Path, name: str, faults: Faults, robot: Robot | None = 
         path = folder / f"{part}.csv"
         if path.exists():
             parts[part], more = _part(path, f"{name}/{path.name}", part, faults)
-            _merge(covariates, more, path)
+            for column in more.keys() & covariates.keys():
+                raise Error(f"{path}:1: column {column!r} is a covariate that another table of the run has too")
+            covariates |= more
     for part in _TRAJECTORIES:
         path = folder / f"{part}{SUFFIX}"
         if path.exists():
@@ -143,13 +145,6 @@ def _part(path: Path, where: str, part: str, faults: Faults) -> tuple[Series | N
             if covariate is not None:
                 covariates[name] = covariate
     return series, covariates
-
-
-def _merge(covariates: dict[str, Series], more: dict[str, Series], path: Path) -> None:
-    for name, series in more.items():
-        if name in covariates:
-            raise Error(f"{path}:1: column {name!r} is a covariate that another table of the run has too")
-        covariates[name] = series
 
 
 def _is_beam(name: str) -> bool:

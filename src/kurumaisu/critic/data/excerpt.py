@@ -17,6 +17,7 @@ from kurumaisu.types import BoolArray
 
 _HELD = ("command", "voltage")
 _MEASURED = ("pose", "odom", "scan")
+_DRIVEN = (*_HELD, "pose", "odom")  # that tell when a drive was
 _BESIDE = ("imu",)  # measured, too, but no drive begins or ends with it
 _NAMES = (*_HELD, *_MEASURED, *_BESIDE)
 LONGEST = 5400.0  # [s] of a run that is criticised whole
@@ -78,9 +79,9 @@ def gap(text: str) -> Gap:
     return Gap(part, moment(start), moment(stop))
 
 
-def span(run: Run) -> tuple[float, float]:
-    """Return the first and the last time of any part of a run [s]. Raise Error for one that has none."""
-    parts = run.parts(*_HELD, *_MEASURED).values()
+def span(run: Run, *names: str) -> tuple[float, float]:
+    """Return the first and the last time [s] of some parts of a run, by default all. Raise Error for one of none."""
+    parts = run.parts(*(names or (*_HELD, *_MEASURED))).values()
     if not parts:
         raise Error(f"{run.name}: has no part of a run")
     return min(float(part.t[0]) for part in parts), max(float(part.t[-1]) for part in parts)
@@ -185,10 +186,9 @@ def with_elapsed_time(recording: Recording) -> Recording:
     """
     if len(recording.train) < _FEWEST or any(effects.RECORDING_TIME in run.covariates for run in recording.runs):
         return recording
-    spans = [_span(run) for run in recording.runs]
-    if any(span is None for span in spans):
+    if not all(run.parts(*_DRIVEN) for run in recording.runs):
         return recording
-    starts, ends = np.array(spans, dtype=np.float64).T
+    starts, ends = np.array([span(run, *_DRIVEN) for run in recording.runs]).T
     if (starts[1:] >= ends[:-1]).all():
         offsets = np.full(len(starts), -starts[0])
     else:
@@ -198,10 +198,3 @@ def with_elapsed_time(recording: Recording) -> Recording:
         series = Series(times, (times + offset)[:, np.newaxis], (effects.RECORDING_TIME,))
         runs.append(replace(run, covariates={**run.covariates, effects.RECORDING_TIME: series}))
     return replace(recording, runs=tuple(runs))
-
-
-def _span(run: Run) -> tuple[float, float] | None:
-    series = [part for part in run.parts("command", "voltage", "pose", "odom").values() if len(part.t)]
-    if not series:
-        return None
-    return min(float(part.t[0]) for part in series), max(float(part.t[-1]) for part in series)

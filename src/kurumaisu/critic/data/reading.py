@@ -124,22 +124,18 @@ def read_run(
 
     put_aside, topics: of a bag, as read_bag_run has them.
     """
-    run, mount = _read(source, meta, faults, put_aside, topics)
-    return completed(run, meta.command_hold, faults, meta.imu), mount
-
-
-def _read(
-    source: Path, meta: Meta, faults: Faults, put_aside: PutAside | None, topics: Mapping[str, Topic] | None
-) -> tuple[Run, LaserMount | None]:
+    mount = None
     if source.is_dir() and not is_bag(source):
-        return read_csv_run(source, source.resolve().name, faults, meta.robot), None
-    if is_rawlog(source):
-        return read_rawlog_run(source, faults)
-    if is_carmen(source):
-        return read_carmen_run(source, faults)
-    run = read_bag_run(source, meta, faults, put_aside, topics)
-    queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
-    return (replace(run, queries=read_queries(queries)) if queries.is_file() else run), None
+        run = read_csv_run(source, source.resolve().name, faults, meta.robot)
+    elif is_rawlog(source):
+        run, mount = read_rawlog_run(source, faults)
+    elif is_carmen(source):
+        run, mount = read_carmen_run(source, faults)
+    else:
+        run = read_bag_run(source, meta, faults, put_aside, topics)
+        queries = (source if source.is_dir() else source.with_suffix("")) / f"{QUERY}.csv"
+        run = replace(run, queries=read_queries(queries)) if queries.is_file() else run
+    return completed(run, meta.command_hold, faults, meta.imu), mount
 
 
 def chosen(sources: list[Path], wanted: Sequence[str]) -> list[Path]:

@@ -20,7 +20,6 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive, prepare
 from kurumaisu.critic.engine.catalogue import Term
 from kurumaisu.critic.engine.evidence import Fit, Problem, log_posterior
-from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import odds
 from kurumaisu.critic.values.policy import RIVAL
@@ -37,20 +36,6 @@ PRIOR = 3.0  # sd of a parameter about its null before any data, in units of its
 DECIDED = 12.0  # [nat] more than that between two explanations decides nothing more
 LISTED_IDS = 4  # ids in a sentence; the verdict has them all
 _RIVALS = 6  # explanations that are compared, at most
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """Terms with values, and the covariance (k, k) of those that are not fixed, per step: what is in doubt."""
-
-    terms: tuple[Term, ...]
-    values: FloatArray
-    covariance: FloatArray
-
-    @property
-    def ids(self) -> frozenset[str]:
-        """Return the effects that it blames."""
-        return frozenset(term.id for term in self.terms)
 
 
 @dataclass(frozen=True)
@@ -86,13 +71,6 @@ def planned(script: Script, model: Model, settings: Sequence[EffectSetting]) -> 
     poses = Series(t, path, ("x", "y", "theta"))
     drive = prepare(Run(script.name, voltage=voltage, pose=poses), model)
     return replace(drive, poses=replay.path(drive, model, settings))
-
-
-def predict(drive: Drive, model: Model, noise: Noise, explanation: Explanation) -> DrivePrediction:
-    """Return what an explanation says of a drive."""
-    terms, values = explanation.terms, explanation.values
-    residual, slopes = Problem([drive], model, noise, ()).linearised(terms, values, free(terms))
-    return DrivePrediction(-residual, slopes, explanation.covariance)
 
 
 def doubt(problem: Problem, terms: Sequence[Term], values: FloatArray) -> FloatArray:
@@ -157,9 +135,9 @@ def propose(problem: Problem, found: SearchResult, scripts: Sequence[Script]) ->
     if len(fits) < 2:
         return Proposal()
     open_ids = sorted(frozenset.union(*(f.ids for f in fits)) - frozenset.intersection(*(f.ids for f in fits)))
-    rivals = [Explanation(f.terms, f.values, doubt(problem, f.terms, f.values)) for f in fits]
+    doubts = [doubt(problem, fit.terms, fit.values) for fit in fits]
     able = [script for script in scripts if possible(script, problem.model)]
-    worth = [_expected(problem, script, fits[0], rivals, weights) for script in able]
+    worth = [_expected(problem, script, fits, doubts, weights) for script in able]
     listed = _listed(open_ids)
     if max((nats for nats, _ in worth), default=0.0) < NOTHING:
         asked = any(issubclass(effects.by_id(name), ReferenceEffect) for name in open_ids)
@@ -196,14 +174,17 @@ def _listed(ids: Sequence[str]) -> str:
 
 
 def _expected(
-    problem: Problem, script: Script, likeliest: Fit, rivals: Sequence[Explanation], weights: FloatArray
+    problem: Problem, script: Script, rivals: Sequence[Fit], doubts: Sequence[FloatArray], weights: FloatArray
 ) -> tuple[float, float]:
     """Return the expected log evidence [nat] of a script for the truth over its rivals, whole, and what of it decides.
 
-    Beyond DECIDED nothing more is decided between two.
+    rivals: the likeliest first; doubts: of each, as doubt has it. Beyond DECIDED nothing more is decided between two.
     """
-    drive = planned(script, problem.model, likeliest.settings)
-    said = [predict(drive, problem.model, problem.noise, rival) for rival in rivals]
+    drive = planned(script, problem.model, rivals[0].settings)
+    ahead, said = Problem([drive], problem.model, problem.noise, ()), []
+    for rival, covariance in zip(rivals, doubts, strict=True):
+        residual, slopes = ahead.linearised(rival.terms, rival.values, free(rival.terms))
+        said.append(DrivePrediction(-residual, slopes, covariance))
     pairs = np.array([[divergence(a, b) if a is not b else 0.0 for b in said] for a in said])
     # The truth is each of them with its posterior; the rival it has to beat is each other one, likewise.
     chance = np.outer(weights, weights) * (1 - np.eye(len(weights)))

@@ -16,7 +16,7 @@ from kurumaisu import program, settings
 from kurumaisu.critic.engine.catalogue import Candidate, Term, candidates, catalogue
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment import design
-from kurumaisu.critic.experiment.design import Explanation, drives
+from kurumaisu.critic.experiment.design import drives
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.values.policy import NAMED
 from kurumaisu.errors import Error, failed
@@ -28,6 +28,8 @@ from kurumaisu.types import FloatArray
 _POWER = 0.95  # of the drives of that length decide
 # [nat] log evidence beyond which p >= NAMED between two explanations that were equally probable
 _ENOUGH = math.log(NAMED / (1 - NAMED))
+
+Cause = tuple[tuple[Term, ...], FloatArray]  # its terms and their values
 
 
 @dataclass(frozen=True)
@@ -67,8 +69,8 @@ def noise() -> Noise:
     return found
 
 
-def cause(model: Model, text: str) -> Explanation:
-    """Return the effect of `ID` at its typical size or of `ID=SIZE`, its first parameter.
+def cause(model: Model, text: str) -> Cause:
+    """Return the terms of the effect `ID` with its typical size, or that of `ID=SIZE`, its first parameter.
 
     Raise Error for an id that the critic does not look for, and for a size that is none.
     """
@@ -81,8 +83,7 @@ def cause(model: Model, text: str) -> Explanation:
     if size:
         values[0] = _size(text, size, chosen)
         values[1:] = [term.null for term in chosen.terms[1:]]
-    count = len(design.free(chosen.terms))
-    return Explanation(chosen.terms, values, np.zeros((count, count)))
+    return chosen.terms, values
 
 
 def _size(text: str, size: str, chosen: Candidate) -> float:
@@ -96,7 +97,7 @@ def _size(text: str, size: str, chosen: Candidate) -> float:
     return value
 
 
-def plan(model: Model, assumed: Noise, causes: Sequence[Explanation]) -> list[Row]:
+def plan(model: Model, assumed: Noise, causes: Sequence[Cause]) -> list[Row]:
     """Return the experiments, the quickest first: one cause against nothing, or one against another, either way."""
     rows = [_row(script, model, assumed, causes) for script in drives() if design.possible(script, model)]
     return sorted(rows, key=lambda row: (row.seconds, -row.nats))
@@ -115,24 +116,25 @@ def table(question: Sequence[str], rows: Sequence[Row]) -> str:
     return "\n".join(lines)
 
 
-def _row(script: Script, model: Model, assumed: Noise, causes: Sequence[Explanation]) -> Row:
+def _row(script: Script, model: Model, assumed: Noise, causes: Sequence[Cause]) -> Row:
     drive = design.planned(script, model, ())
     # An effect with a threshold shows by a whole step of its typical size, if at all.
     terms = tuple(replace(term, step=1.0) for term in catalogue(model))
     problem = Problem([drive], model, assumed, terms)
     silent, slopes = problem.linearised((), np.empty(0), terms)
-    signals = [silent - problem.residual(one.terms, one.values) for one in causes]
+    signals = [silent - problem.residual(*one) for one in causes]
 
     def against(signal: FloatArray, names: frozenset[str]) -> float:
         use = [i for i, term in enumerate(terms) if term.id in names]
         return design.left_over(signal, slopes[:, use], design.prior([terms[i] for i in use]))
 
+    ids = [frozenset(term.id for term in acting) for acting, _ in causes]
     nats, rival = against(signals[0], frozenset()), None
     if len(causes) == 1:
-        others = {term.id for term in terms} - causes[0].ids
+        others = {term.id for term in terms} - ids[0]
         rival = min(((name, against(signals[0], frozenset([name]))) for name in others), key=lambda pair: pair[::-1])
     else:
-        nats = min(against(signals[0], causes[1].ids), against(signals[1], causes[0].ids))
+        nats = min(against(signals[0], ids[1]), against(signals[1], ids[0]))
     return Row(script, nats, power(nats), script.seconds * repeats(nats), rival)
 
 

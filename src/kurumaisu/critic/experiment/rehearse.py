@@ -53,7 +53,6 @@ def manner() -> Manner:
     """Return how base and reference work, launch/rehearsal.yaml and base_node.yaml. Raise Error naming file and key."""
     reference = settings.load(shipped("launch/rehearsal.yaml")).section("reference")
     found = Manner(
-        period=PERIOD,
         limits=base_limits(),
         pose_every=reference.number("every", above=0),
         position_sd=reference.number("position_sd", at_least=0),
@@ -112,7 +111,7 @@ class Rehearsal:
 
     def _inputs(self, script: Script) -> dict[str, FloatArray]:
         """Return the tables command (n, 3) of a drive, and voltage (n, 5): t, v_f, v_s, v, w, NaN where unknown."""
-        rows = samples(script.phases, self._manner.period)
+        rows = samples(script.phases, PERIOD)
         t = rows[:, 0]
         if script.kind == "sweep":
             if not self._model.robot.voltages:
@@ -153,11 +152,10 @@ class Rehearsal:
 class Manner:
     """How the base and the reference work.
 
-    period [s] of the base's loop; limits: the base's own, which bound what is asked for;
+    limits: the base's own, which bound what is asked for;
     pose_every [s]; position_sd [m], heading_sd [rad] of the reference.
     """
 
-    period: float
     limits: Limits
     pose_every: float
     position_sd: float

@@ -14,6 +14,7 @@ from kurumaisu import effects, geometry, slam_score
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import driven, prepare_all
+from kurumaisu.critic.data.reference import map_run
 from kurumaisu.critic.heldout import scan_gain
 from kurumaisu.critic.heldout.drive_gain import blocks, rmse_gain
 from kurumaisu.critic.predict.motion import Forecast
@@ -26,7 +27,7 @@ from kurumaisu.critic.values.story import Overlay
 from kurumaisu.critic.values.verdict import Cause, ChannelGain, Gain, SlamGain
 from kurumaisu.effects import Beams, Echoes
 from kurumaisu.errors import Error
-from kurumaisu.params import EffectSetting, Laser, Model, shipped
+from kurumaisu.params import EffectSetting, Laser, Model
 from kurumaisu.types import FloatArray
 
 if TYPE_CHECKING:  # loading MRPT takes a third of a second, which most recordings need not pay
@@ -141,12 +142,10 @@ def _log(run: Run, model: Model, settings: Sequence[EffectSetting], scans: Corre
 
 
 def _mapped(log: ScanLog, reference: Series) -> _Path:
-    slam = import_module("kurumaisu.slam")
-    settings = slam.load_mapping_settings(shipped("launch/mapping_node.yaml"))
     truth = geometry.interpolate(reference.t, reference.values[:, :3], log.times)
     aligned, squares = [], []
     for seed in _SEEDS:
-        path = slam.map_scans(settings, log, seed).trajectory[:, 1:]
+        path = map_run(log, seed, lambda _: None).trajectory[:, 1:]
         placed = geometry.compose(np.broadcast_to(slam_score.align(path, truth), path.shape), path)
         off = placed - truth
         squares.append(np.column_stack([(off[:, :2] ** 2).sum(axis=1), geometry.wrap(off[:, 2]) ** 2]))

@@ -180,36 +180,24 @@ def verdict_text(verdict: Verdict) -> str:
 
 
 def _check(content: Any) -> None:
-    for name, value in _numbers(content, ""):
-        if not -math.inf < value < math.inf:  # of integers, too, whatever their length
-            raise Error(f"verdict: {name}: must be a finite number: {value}")
+    for name, part in _parts(content, ""):
+        if isinstance(part, float) and not math.isfinite(part):
+            raise Error(f"verdict: {name}: must be a finite number: {part}")
     schema = json.loads(Path(__file__).with_name("verdict.schema.json").read_text(encoding="utf-8"))
     fault = jsonschema.exceptions.best_match(jsonschema.Draft202012Validator(schema).iter_errors(content))
     if fault is not None:
         raise Error(f"verdict: {'.'.join(map(str, fault.absolute_path)) or 'the file'}: {fault.message}")
-    for name, part in _intervals(content, ""):
-        if part["lo90"] > part["hi90"]:
+    for name, part in _parts(content, ""):
+        if isinstance(part, dict) and "lo90" in part and part["lo90"] > part["hi90"]:
             raise Error(f"verdict: {name}: lo90 {part['lo90']:g} is above hi90 {part['hi90']:g}")
 
 
-def _numbers(content: Any, name: str) -> Iterator[tuple[str, float]]:
-    if isinstance(content, float):
-        yield name, content
-    for key, value in _members(content):
-        yield from _numbers(value, f"{name}.{key}".lstrip("."))
-
-
-def _intervals(content: Any, name: str) -> Iterator[tuple[str, dict[str, float]]]:
-    if isinstance(content, dict) and "lo90" in content:
-        yield name, content
-    for key, value in _members(content):
-        yield from _intervals(value, f"{name}.{key}".lstrip("."))
-
-
-def _members(content: Any) -> list[tuple[str, Any]]:
-    if isinstance(content, dict):
-        return list(content.items())
-    return [(str(i), item) for i, item in enumerate(content)] if isinstance(content, list) else []
+def _parts(content: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Yield all that there is in JSON, with its name."""
+    yield name, content
+    members = content.items() if isinstance(content, dict) else enumerate(content) if isinstance(content, list) else ()
+    for key, value in members:
+        yield from _parts(value, f"{name}.{key}".lstrip("."))
 
 
 def grouped(problems: Sequence[str]) -> list[tuple[str, list[str]]]:
