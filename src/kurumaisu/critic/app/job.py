@@ -79,14 +79,19 @@ def run(job: Job, progress: Callable[[str], None]) -> Outcome:
     start = time.monotonic()
     try:
         criticism = criticise(job, progress)
-    except Error as error:
-        return Outcome(job, time.monotonic() - start, error=one_line(error))
     except Exception as error:
-        words = f"the critic itself failed: {type(error).__name__}: {' '.join(str(error).split())}"
-        return Outcome(job, time.monotonic() - start, error=words, trace=traceback.format_exc())
+        trace = "" if isinstance(error, Error) else traceback.format_exc()
+        return Outcome(job, time.monotonic() - start, error=why_none(error), trace=trace)
     seconds = time.monotonic() - start
     story = criticism.story
     return Outcome(job, seconds, criticism.verdict, story.headline, story.details, story.next_drive, story.paste)
+
+
+def why_none(error: Exception) -> str:
+    """Return in one line why there is no verdict: by the input, or by the critic's own fault."""
+    if isinstance(error, Error):
+        return one_line(error)
+    return f"the critic itself failed: {type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def criticise(job: Job, progress: Callable[[str], None]) -> Criticism:

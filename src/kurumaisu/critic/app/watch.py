@@ -12,12 +12,12 @@ import numpy as np
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.app.arrays import run_of
+from kurumaisu.critic.app.job import why_none
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.reference import with_reference
 from kurumaisu.critic.processes.worker import ProgressMessage, Worker
 from kurumaisu.critic.values.recording import Fan, Recording, Run
 from kurumaisu.critic.values.verdict import Verdict
-from kurumaisu.errors import Error, one_line
 from kurumaisu.types import FloatArray
 
 _SEED = 1  # of the particle filter that makes a missing reference
@@ -41,10 +41,8 @@ def criticise(
     """Return the answer about a recording in memory, writing nothing."""
     try:
         found = pipeline.criticise(with_reference(recording, _SEED, progress), model, progress, ids=ids)
-    except Error as error:
-        return WatchedCriticism(None, one_line(error))
     except Exception as error:  # a window that nobody foresaw must not end the watch
-        return WatchedCriticism(None, f"the critic itself failed: {type(error).__name__}: {error}")
+        return WatchedCriticism(None, why_none(error))
     return WatchedCriticism(found.verdict, found.story.headline)
 
 

@@ -14,13 +14,6 @@ from kurumaisu.critic.values.recording import PARTS, Fan
 from kurumaisu.errors import Error
 from kurumaisu.plausible import yaw_or_nan
 
-COLUMNS = {
-    "command": ("v", "w"),
-    "voltage": ("v_f", "v_s", "v", "w"),
-    "pose": ("x", "y", "theta"),
-    "odom": ("x", "y", "theta", "v", "w"),
-    "imu": ("wx", "wy", "wz", "ax", "ay", "az"),
-}
 # The field of a message that gives the covariate its plain name; others are called topic.field.
 MAIN_FIELD = {
     "sensor_msgs/msg/BatteryState": "voltage",

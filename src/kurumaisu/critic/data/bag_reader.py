@@ -18,6 +18,7 @@ from kurumaisu.critic.bags.topics import Convert, Topic, read_topics
 from kurumaisu.critic.bags.transforms import TOPICS as TRANSFORMS
 from kurumaisu.critic.bags.transforms import read_frame
 from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
+from kurumaisu.critic.data.csv_reader import IMU, OPTIONAL, REQUIRED
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS, JOINTS, Spans, read_wheels
 from kurumaisu.critic.imu.yaw_rate import UNUSED
@@ -117,7 +118,8 @@ def _said(part: str, topic: Topic, keep: IntArray) -> tuple[tuple[str, ...], Flo
     needed = {"voltage": 2, "odom": 3, "imu": 3}.get(part, rows.shape[1])
     if not np.nan_to_num(rows[:, needed:]).any():
         rows = rows[:, :needed]
-    return messages.COLUMNS[part][: rows.shape[1]], rows
+    names = IMU[-1] if part == "imu" else (*REQUIRED[part], *OPTIONAL.get(part, ()))
+    return names[: rows.shape[1]], rows
 
 
 def _east_and_north(fixes: FloatArray) -> FloatArray:

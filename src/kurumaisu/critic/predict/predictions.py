@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kurumaisu import geometry
 from kurumaisu.critic.base.covariates import with_covariates_but_place
 from kurumaisu.critic.base.drive import driven, prepare_all
 from kurumaisu.critic.data.csv_reader import csv_text
@@ -117,7 +118,7 @@ class ScanMatcher:
         means, sds = self.alone.predict(shots)
         if self.after is None:
             return means, sds
-        errors = pose_errors(shots, run, places.zero, self.alone)
+        errors = pose_errors(shots, run, self.alone)
         if errors:
             able = np.array(sorted(errors))
             means[able], sds[able] = self.after.predict(pose_corrected(shots, errors, self.share))
@@ -130,7 +131,7 @@ def trained_matcher(places: ScanPoses, settings: Settings) -> ScanMatcher:
     whole = joined([shots for _, shots in runs])
     alone = fit_scatter(whole, settings)
     best, after, share = -np.inf, None, 0.0
-    parts = [(shots, pose_errors(shots, run, places.zero, alone)) for run, shots in runs]
+    parts = [(shots, pose_errors(shots, run, alone)) for run, shots in runs]
     parts = [(shots, errors) for shots, errors in parts if errors]
     for tried in _SHARES if sum(len(errors) for _, errors in parts) >= _FEWEST else ():
         some = joined([pose_corrected(shots, errors, tried) for shots, errors in parts])
@@ -149,18 +150,18 @@ def _density(model: ScanModel, shots: Shots) -> float:
     return -float(np.mean(0.5 * np.minimum(z[use] ** 2, OUTLIER**2) + np.log(sds[use])))
 
 
-def pose_errors(shots: Shots, run: Run, zero: float, model: ScanModel) -> dict[int, FloatArray]:
+def pose_errors(shots: Shots, run: Run, model: ScanModel) -> dict[int, FloatArray]:
     """Return the errors (3,) of the poses of shots by the scans before them, by row, for those that have any."""
     if run.scan is None:
         return {}
-    before = [_before(shots, k, run.scan.t - zero) for k in range(len(shots.stamps))]
+    before = [_before(shots, k, run.scan.t - shots.zero) for k in range(len(shots.stamps))]
     owner = np.repeat(np.arange(len(before)), [len(rows) for rows in before])
     if not len(owner):
         return {}
     rows = np.concatenate(before).astype(int)
     measured = run.scan.values[rows]
     shift = np.zeros((*measured.shape, 3))
-    seen = replace(some_scans(shots, owner), stamps=run.scan.t[rows] - zero, measured=measured, shift=shift)
+    seen = replace(some_scans(shots, owner), stamps=run.scan.t[rows] - shots.zero, measured=measured, shift=shift)
     return _errors(seen, owner, model)
 
 
@@ -180,9 +181,8 @@ def _before(shots: Shots, k: int, stamps: FloatArray) -> IntArray:
     stamp = float(shots.stamps[k])
     rows = np.flatnonzero((stamps < stamp - 1e-6) & (stamps > stamp - _REACH))[-_MOST:]
     track = shots.tracks[shots.run[k]]
-    at = [np.array([np.interp(t, track.times, track.poses[:, i]) for i in range(3)]) for t in (stamp, *stamps[rows])]
-    near = [bool(np.abs(pose - at[0]).max() < _WITHIN) for pose in at[1:]]
-    return np.asarray(rows[np.array(near, dtype=bool)])
+    here, *before = geometry.interpolate(track.times, track.poses, np.array([stamp, *stamps[rows]]))
+    return np.asarray(rows[[bool(np.abs(pose - here).max() < _WITHIN) for pose in before]], dtype=int)
 
 
 def _errors(shots: Shots, owner: IntArray, model: ScanModel) -> dict[int, FloatArray]:

@@ -32,13 +32,8 @@ class ScanPoses:
 
     def __init__(self, recording: Recording, model: Model, forecast: Forecast | None) -> None:
         """Take a recording whose laser can be criticised; forecast: None where nobody knows how the chair moves."""
-        self._recording, self._model, self._forecast = recording, model, forecast
+        self._recording, self._forecast = recording, forecast
         self._base = gather(recording, model)
-        self._truth = recording.truth
-        first = next(run for run in recording.runs if run.name in recording.train and run.scan is not None and run.pose)
-        assert first.pose is not None
-        #: [s] at which the laser's time begins.
-        self.zero = float(first.pose.t[0] - self._base.tracks[0].times[0])
 
     def of(self, run: Run, stamps: FloatArray, measured: FloatArray | None = None) -> Shots:
         """Return shots of a run with poses at stamps (k,) [s]; measured (k, b) [m], if known."""
@@ -47,8 +42,8 @@ class ScanPoses:
         owner = np.arange(len(stamps)) if len(tracks) > 1 else np.zeros(len(stamps), dtype=int)
         return replace(
             self._base,
-            tracks=tuple(replace(track, times=track.times - self.zero) for track in tracks),
-            stamps=stamps - self.zero,
+            tracks=tuple(replace(track, times=track.times - self._base.zero) for track in tracks),
+            stamps=stamps - self._base.zero,
             run=owner,
             measured=np.full(shape, np.nan) if measured is None else measured,
             shift=np.zeros((*shape, 3)),
@@ -58,23 +53,14 @@ class ScanPoses:
 
     def trained_runs(self) -> list[tuple[Run, Shots]]:
         """Return the runs to fit, each with few of its shots."""
-        few = thin(self._base, _RANDOM)
-        scanned = [
-            run
-            for run in self._recording.runs
-            if run.name in self._recording.train and run.scan is not None and run.pose
-        ]
-        return [
-            (run, self.of(run, few.stamps[few.run == i] + self.zero, few.measured[few.run == i]))
-            for i, run in enumerate(scanned)
-            if (few.run == i).any()
-        ]
+        few, runs = thin(self._base, _RANDOM), {run.name: run for run in self._recording.runs}
+        owned = [(runs[name], few.run == i) for i, name in enumerate(few.runs) if (few.run == i).any()]
+        return [(run, self.of(run, few.stamps[rows] + few.zero, few.measured[rows])) for run, rows in owned]
 
     def _tracks(self, run: Run, stamps: FloatArray) -> list[Track]:
         assert run.pose is not None
         if self._forecast is None or not driven(run):
-            track = Track(run.pose.t, run.pose.values[:, :3])
-            return [track if self._truth is None else replace(track, doubt=self._truth)]
+            return [Track(run.pose.t, run.pose.values[:, :3], self._recording.truth or Track.doubt)]
         forecast = self._forecast
         drive = with_covariates_but_place(prepare_all(run, forecast.model, float(stamps.max()) + _AROUND[-1]), run)
         paths = Paths(drive, forecast.model, forecast.settings, ())

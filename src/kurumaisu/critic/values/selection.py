@@ -22,7 +22,7 @@ def effect_ids(only: Sequence[str], without: Sequence[str]) -> frozenset[str] | 
     """
     if not only and not without:
         return None
-    catalogue = (*(effect.id for effect in effects.ALL), effects.SMOOTH)
+    catalogue = sorted(those(None))
     wanted: set[str] = set() if only else set(catalogue)
     for pattern in only:
         wanted |= set(matching("--only", pattern, catalogue, "effect", _PAGE))

@@ -11,11 +11,7 @@ from kurumaisu.critic.values.verdict import NORMAL90
 from kurumaisu.types import FloatArray, IntArray
 
 _BINS = 15  # at most
-
-
 _FEWEST = 5  # points of which a mean has an interval
-
-
 FOLLOWED = 0.3  # share of an effect that means over a covariate must explain, to be drawn over it
 
 
