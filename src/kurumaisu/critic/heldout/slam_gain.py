@@ -71,8 +71,8 @@ def measure(recording: Recording, model: Model, refit: Refit) -> tuple[SlamGain,
         sides.append(_mapped(log, run.pose))
     gains = []
     for i, unit in enumerate(("m", "rad")):
-        before, after = (blocks(side.squares[:, :, i], side.times - side.times[0]) for side in sides)
-        gains.append(rmse_gain(before, after, unit))
+        baseline, extended = (blocks(side.squares[:, :, i], side.times - side.times[0]) for side in sides)
+        gains.append(rmse_gain(baseline, extended, unit))
     measured, before, after = (path[:, :2] for path in (sides[0].truth, sides[0].poses, sides[1].poses))
     picture = Overlay(f"SLAM on {run.name}", measured, before, after, run.name in recording.test, restart=0.0)
     return SlamGain(run.name, len(sides[0].times), *gains), picture
