@@ -10,7 +10,8 @@ import pytest
 from kurumaisu.bench.critic import drives, sanity, wrong_data, wrong_scans
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.data.reading import read_recording
-from kurumaisu.critic.sanity import input_match, map_agreement, pose_jumps, rates
+from kurumaisu.critic.rates import mean_rates as rates
+from kurumaisu.critic.sanity import input_match, map_agreement, pose_jumps
 from kurumaisu.critic.sanity import rows as sanity_rows
 from kurumaisu.critic.sanity.examination import examine
 from kurumaisu.critic.values.recording import Series

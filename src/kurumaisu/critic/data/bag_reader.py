@@ -21,7 +21,7 @@ from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
 from kurumaisu.critic.data.csv_reader import IMU, OPTIONAL, REQUIRED
 from kurumaisu.critic.data.meta import Meta
 from kurumaisu.critic.data.odometry import COLUMNS, JOINTS, Spans, read_wheels
-from kurumaisu.critic.imu.yaw_rate import UNUSED
+from kurumaisu.critic.rates.yaw_rate import UNUSED
 from kurumaisu.critic.values.recording import PARTS, Fan, Run, Series, run_of_parts
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap

@@ -9,7 +9,7 @@ import numpy as np
 
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.odometry import COLUMNS, driven_by, rates_between
-from kurumaisu.critic.imu.yaw_rate import heading, with_yaw_rate
+from kurumaisu.critic.rates.yaw_rate import heading, with_yaw_rate
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.geometry import wrap

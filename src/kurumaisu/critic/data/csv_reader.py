@@ -17,7 +17,7 @@ import numpy as np
 from kurumaisu.bounded_files import MOST_TABLE, read_text
 from kurumaisu.critic.data.clean import Faults, Table, clean, clean_part
 from kurumaisu.critic.data.odometry import with_wheels
-from kurumaisu.critic.imu.yaw_rate import ACCELERATIONS, RATE, RATES
+from kurumaisu.critic.rates.yaw_rate import ACCELERATIONS, RATE, RATES
 from kurumaisu.critic.values.recording import Run, Series, run_of_parts
 from kurumaisu.errors import Error, told
 from kurumaisu.params import Robot

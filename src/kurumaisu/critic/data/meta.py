@@ -10,7 +10,7 @@ from pathlib import Path
 from kurumaisu import settings
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.odometry import Wheels
-from kurumaisu.critic.imu.yaw_rate import AXES, UNUSED
+from kurumaisu.critic.rates.yaw_rate import AXES, UNUSED
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run
 from kurumaisu.errors import Error, told
 from kurumaisu.params import MOST_BEAMS, Robot, robot_of, shipped

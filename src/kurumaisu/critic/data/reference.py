@@ -11,7 +11,7 @@ import numpy as np
 
 from kurumaisu.critic.base.drive import driven
 from kurumaisu.critic.data.odometry import along, rates_between
-from kurumaisu.critic.imu.yaw_rate import heading
+from kurumaisu.critic.rates.yaw_rate import heading
 from kurumaisu.critic.values.criticism import Progress
 from kurumaisu.critic.values.recording import Recording, Run, Series
 from kurumaisu.errors import Error

@@ -17,10 +17,10 @@ from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem
 from kurumaisu.critic.experiment.design import Proposal
 from kurumaisu.critic.heldout.materiality import NO_NOISE, holds, matters, share_of_noise, share_of_way
-from kurumaisu.critic.imu.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.judge import intervals, misfit, sentences
 from kurumaisu.critic.judge.decide import Decision
 from kurumaisu.critic.judge.misfit import overlays
+from kurumaisu.critic.judge.turning_only import EXPLAINED, beyond_imu
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.policy import NAMED

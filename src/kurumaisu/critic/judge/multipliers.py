@@ -25,7 +25,7 @@ from kurumaisu.critic.base.replay import robot_said
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.experiment import design
-from kurumaisu.critic.imu.turning_only import SCALE_SD, with_limits
+from kurumaisu.critic.judge.turning_only import SCALE_SD, with_limits
 from kurumaisu.critic.values.criticism import Criticism
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.recording import Recording

@@ -11,7 +11,7 @@ from kurumaisu import effects
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Fit, Problem
 from kurumaisu.critic.heldout.materiality import HORIZON, MATERIAL
-from kurumaisu.critic.imu.turning_only import EXPLAINED
+from kurumaisu.critic.judge.turning_only import EXPLAINED
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.digits import quantities, with_interval
 from kurumaisu.critic.values.policy import NAMED, RIVAL

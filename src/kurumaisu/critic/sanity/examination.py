@@ -11,19 +11,19 @@ import numpy as np
 from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.ranges.scans.gathering import laser_of, time_zero
+from kurumaisu.critic.rates import mean_rates
+from kurumaisu.critic.rates.mean_rates import Rates, of_input
 from kurumaisu.critic.sanity import (
     headings,
     imu_match,
     input_match,
     map_agreement,
     pose_jumps,
-    rates,
     rows,
     units,
 )
 from kurumaisu.critic.sanity.headings import Course
 from kurumaisu.critic.sanity.input_match import Match
-from kurumaisu.critic.sanity.rates import Rates, of_input
 from kurumaisu.critic.values.recording import LaserMount, Recording, Run, Series
 from kurumaisu.params import Model
 from kurumaisu.types import FloatArray
@@ -159,14 +159,14 @@ def _mended(pose: Series, found: Course | None) -> Series:
 
 def _rates(part: Series, pose: Series) -> tuple[Rates, Rates] | None:
     """Return what was asked for and what was driven on one grid, None where there is too little of both."""
-    t = rates.grid(min(part.t[0], pose.t[0]), max(part.t[-1], pose.t[-1]))
+    t = mean_rates.grid(min(part.t[0], pose.t[0]), max(part.t[-1], pose.t[-1]))
     if len(t) < 100:
         return None
     by_poses = "theta" in part.columns
-    asked = rates.of_poses(part, t) if by_poses else rates.of_input(part.t, part.values[:, :2], t)
+    asked = mean_rates.of_poses(part, t) if by_poses else mean_rates.of_input(part.t, part.values[:, :2], t)
     if by_poses:
         asked.values[(t < part.t[0]) | (t > part.t[-1])] = np.nan
-    driven = rates.of_poses(pose, t)
+    driven = mean_rates.of_poses(pose, t)
     driven.values[(t < pose.t[0]) | (t > pose.t[-1])] = np.nan
     return (asked, driven) if _number(asked, driven) >= 8 else None
 
@@ -174,7 +174,7 @@ def _rates(part: Series, pose: Series) -> tuple[Rates, Rates] | None:
 def _number(asked: Rates, driven: Rates) -> float:
     """Return how many independent samples both have in common."""
     known = np.isfinite(asked.values + driven.values).all(axis=1)
-    return float(known.sum() * rates.STEP / rates.SPAN)
+    return float(known.sum() * mean_rates.STEP / mean_rates.SPAN)
 
 
 def _agreement(factor: float, known: list[tuple[str, Match, float]]) -> tuple[bool | None, bool | None]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kurumaisu.critic.imu.yaw_rate import heading
+from kurumaisu.critic.rates.yaw_rate import heading
 from kurumaisu.critic.values.digits import moment, times
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.robust import SIGMA_PER_MAD

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kurumaisu.critic.rates.mean_rates import SPAN, STEP, Rates, ShiftCorrelation, shift_correlation
 from kurumaisu.critic.sanity.headings import WIN
-from kurumaisu.critic.sanity.rates import SPAN, STEP, Rates, ShiftCorrelation, shift_correlation
 from kurumaisu.types import BoolArray, FloatArray
 
 _LATE = 1.5  # [s] motion may come after its command by this much: a delay and a lag

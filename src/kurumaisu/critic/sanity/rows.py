@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from kurumaisu import geometry
-from kurumaisu.critic.sanity.rates import Rates
+from kurumaisu.critic.rates.mean_rates import Rates
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import LaserMount, Series
 from kurumaisu.types import BoolArray, FloatArray, IntArray

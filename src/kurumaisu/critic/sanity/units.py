@@ -14,9 +14,10 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, LONGEST, prepare
-from kurumaisu.critic.sanity import input_match, rates
+from kurumaisu.critic.rates import mean_rates
+from kurumaisu.critic.rates.mean_rates import STEP, Rates, of_input
+from kurumaisu.critic.sanity import input_match
 from kurumaisu.critic.sanity.input_match import Match, shifted
-from kurumaisu.critic.sanity.rates import STEP, Rates, of_input
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.params import EffectSetting, Model
@@ -132,7 +133,7 @@ def _rates(run: Run, driven: Rates, model: Model) -> Iterator[Rates]:
     for effect in effects.of_base(voltages=model.robot.voltages):
         for choice in effect.choices if issubclass(effect, effects.VoltageEffect) else ():
             motion = replay.motion(drive, model, [EffectSetting(effect.id, dict(choice))])
-            yield rates.of_input(times, np.column_stack([motion.v, motion.w]), driven.t)
+            yield mean_rates.of_input(times, np.column_stack([motion.v, motion.w]), driven.t)
 
 
 def untimely(run: Run) -> list[str]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kurumaisu.critic.values.recording import LONGEST_HOLD, Run, Series
+from kurumaisu.critic.rates.mean_rates import STEP, grid, of_input, of_integral, of_samples, shift_correlation
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.errors import Error
 from kurumaisu.types import BoolArray, FloatArray
 
 AXES = ("x", "y", "z", "-x", "-y", "-z")
 _LEAST = 0.02  # [rad/s] sd of a turning below which it says nothing
-_FEWEST = 10.0  # [s] of it that are known
 _ALIKE = 0.7  # correlation from which a rate follows another
 _EARLY, _LATE = -0.5, 1.5  # [s] by which a robot may turn before and after what is said of it
 _LONGEST = 60.0  # [s] shifts of clocks that are tried
@@ -28,9 +28,6 @@ _UNITS = {
     np.pi / 180: "of a robot whose own turns are in degrees",
     1e3: "mrad/s: multiply them by 0.001",
 }
-STEP = 0.1  # [s] between the middles of spans that are compared
-SPAN = 1.0  # [s] over which rates are averaged
-_GAP = 0.5  # [s] without rows that a span may hold
 _MOVES_ON = 1.5  # [s] for which a robot may move on that was asked to rest
 _REST = (0.005, 0.005)  # [m/s], [rad/s] mean rates below which odometry stands
 RATE = ("w",)  # column of what is known to be the robot's yaw rate
@@ -88,9 +85,9 @@ def found(
     """
     for turning in turnings:
         usual, other = _matched(rates, turning.w)
-        if usual is None:
+        if usual.best == 0:  # too little turned
             continue
-        if other is not None and other.best > _ALIKE and other.nats > usual.nats + _WIN:
+        if other.best > _ALIKE and other.nats > usual.nats + _WIN:
             raise UnusableError(
                 f"its clock differs: it follows how {turning.name} {turning.verb} {abs(other.shift):.1f} s "
                 f"{'late' if other.shift > 0 else 'early'} (correlation {other.best:.2f}, else {usual.best:.2f})"
@@ -106,12 +103,6 @@ def found(
         up, name = _named(gravity / np.linalg.norm(gravity))
         return Mounting(up, name, "gravity points there")
     raise UnusableError("too little turned to tell which of its axes is up: say `imu: {axis: z}` in meta.yaml")
-
-
-def gravity_of(accelerations: FloatArray) -> FloatArray | None:
-    """Return the mean of accelerations (n, 3) [m/s^2] if it can be what gravity makes of a sensor at rest."""
-    mean = np.asarray(accelerations.mean(axis=0))
-    return mean if _GRAVITY[0] < np.linalg.norm(mean) < _GRAVITY[1] else None
 
 
 def _by_turning(match: _Match, turning: Turning, gravity: FloatArray | None, given: Mounting | None) -> Mounting:
@@ -143,36 +134,17 @@ def _named(direction: FloatArray) -> tuple[FloatArray, str]:
     return direction, f"({words}), {np.degrees(np.arccos(abs(direction[i]))):.0f} deg off {name},"
 
 
-def _matched(rates: FloatArray, w: FloatArray) -> tuple[_Match | None, _Match | None]:
-    """Return the best match at shifts that a robot may have, and at any other; None where too little turned."""
-    known = np.isfinite(w)
-    if known.sum() * STEP < _FEWEST or float(np.std(w[known])) < _LEAST:
-        return None, None
-    reach = min(round(_LONGEST / STEP), len(w) - 1)
-    matches = [match for shift in range(-reach, reach + 1) if (match := _at(rates, w, shift)) is not None]
-    usual = [match for match in matches if _EARLY <= match.shift <= _LATE]
-    other = [match for match in matches if not _EARLY <= match.shift <= _LATE]
-    best = [max(some, key=lambda match: match.nats) if some else None for some in (usual, other)]
-    return best[0], best[1]
-
-
-def _at(rates: FloatArray, w: FloatArray, shift: int) -> _Match | None:
-    """Return how rates (n, 3) follow w (n,) that many steps later; None where too little is known."""
-    late, early = rates[max(shift, 0) :], w[max(-shift, 0) :]
-    length = min(len(late), len(early))
-    late, early = late[:length], early[:length]
-    both: BoolArray = np.isfinite(early) & np.isfinite(late).all(axis=1)
-    if both.sum() * STEP < max(_FEWEST, 0.4 * len(w) * STEP):
-        return None
-    x, y = early[both] - early[both].mean(), late[both] - late[both].mean(axis=0)
-    spread = np.sqrt((y**2).mean(axis=0) * (x**2).mean())
-    product = (y * x[:, None]).mean(axis=0)
-    if np.std(x) < _LEAST:
-        return None
-    correlation = np.where(spread > 1e-12, product / np.maximum(spread, 1e-12), 0.0)
-    number = len(x) * STEP / SPAN
-    nats = float(-0.5 * number * np.log1p(-min(float((correlation**2).max()), 0.9999)))
-    return _Match(shift * STEP, correlation, product / (x**2).mean(), nats)
+def _matched(rates: FloatArray, w: FloatArray) -> tuple[_Match, _Match]:
+    """Return how rates (n, 3) follow w (n,) best, at shifts that a robot may have and at any other."""
+    axes = [shift_correlation(axis, w, (_NOTHING, _LEAST), _LONGEST) for axis in rates.T]
+    correlation, slope, nats = (
+        np.array(rows) for rows in zip(*((a.correlation, a.slope, a.nats) for a in axes), strict=True)
+    )
+    lags = axes[0].lags
+    usual = (lags >= _EARLY) & (lags <= _LATE)
+    best = [int(np.argmax(np.where(allowed, nats.max(axis=0), -1.0))) for allowed in (usual, ~usual)]
+    one, other = (_Match(float(lags[at]), correlation[:, at], slope[:, at], float(nats[:, at].max())) for at in best)
+    return one, other
 
 
 @dataclass(frozen=True)
@@ -184,36 +156,15 @@ class Turning:
     w: FloatArray
 
 
-def grid(t: FloatArray) -> FloatArray:
-    """Return the middles (n,) [s] of the spans of a series with times (m,)."""
-    return np.arange(t[0] + SPAN / 2, t[-1] - SPAN / 2, STEP)
-
-
-def means(t: FloatArray, rates: FloatArray, at: FloatArray) -> FloatArray:
-    """Return the means over SPAN about times (n,) of rates (m, k) that were measured at times (m,) [s], (n, k)."""
-    steps = (rates[1:] + rates[:-1]) / 2 * np.diff(t)[:, None]
-    return over(t, np.vstack([np.zeros(rates.shape[1]), np.cumsum(steps, axis=0)]), at)
-
-
-def over(t: FloatArray, whole: FloatArray, at: FloatArray) -> FloatArray:
-    """Return what changes by `whole` (m, k) until times (m,) per second of SPAN about times (n,), (n, k)."""
-    a, b = at - SPAN / 2, at + SPAN / 2
-    changes = np.column_stack([np.interp(b, t, column) - np.interp(a, t, column) for column in whole.T]) / SPAN
-    changes[(a < t[0] - STEP) | (b > t[-1] + STEP)] = np.nan
-    for hole in np.flatnonzero(np.diff(t) > max(_GAP, 2.5 * float(np.median(np.diff(t))))):
-        changes[(b > t[hole]) & (a < t[hole + 1])] = np.nan
-    return changes
-
-
 def turnings(run: Run, at: FloatArray) -> Iterator[Turning]:
     """Yield what says how a run turned, that first which says it best."""
     if run.odom is not None and len(run.odom.t) > 2:
-        yield Turning("the odometry", "turns", over(run.odom.t, run.odom.column("theta")[:, None], at)[:, 0])
+        yield Turning("the odometry", "turns", of_integral(run.odom.t, run.odom.column("theta")[:, None], at)[:, 0])
     if run.pose is not None and "theta" in run.pose.columns and len(run.pose.t) > 2:
-        yield Turning("the reference", "turns", over(run.pose.t, run.pose.column("theta")[:, None], at)[:, 0])
+        yield Turning("the reference", "turns", of_integral(run.pose.t, run.pose.column("theta")[:, None], at)[:, 0])
     if run.command is not None and len(run.command.t) > 2:
-        t, held = _held(run.command)
-        yield Turning("the commands", "ask for", over(t, held, at)[:, 1])
+        held = np.column_stack([run.command.column(name) for name in "vw"])
+        yield Turning("the commands", "ask for", of_input(run.command.t, held, at).values[:, 1])
 
 
 def stands(run: Run, at: FloatArray) -> BoolArray:
@@ -221,26 +172,19 @@ def stands(run: Run, at: FloatArray) -> BoolArray:
     known, rest = np.zeros(len(at), dtype=np.bool_), np.ones(len(at), dtype=np.bool_)
     if run.odom is not None and len(run.odom.t) > 2:
         rates = np.abs(np.column_stack([run.odom.column(name) for name in "vw"]))
-        moved = means(run.odom.t, rates, at)
+        moved = of_samples(run.odom.t, rates, at)
         known |= np.isfinite(moved).all(axis=1)
         rest &= (moved < _REST).all(axis=1) | np.isnan(moved).any(axis=1)
     if run.command is not None and len(run.command.t) > 2:
-        t, held = _held(Series(run.command.t, np.abs(run.command.values), run.command.columns))
-        asked = np.column_stack([over(t, held, at - late)[:, :2].sum(axis=1) for late in (0.0, _MOVES_ON / 2, _LATE)])
+        asked = np.column_stack([_asked(run.command, at - late) for late in (0.0, _MOVES_ON / 2, _LATE)])
         known |= np.isfinite(asked).all(axis=1)
         rest &= ~(asked > 1e-9).any(axis=1)
     return np.asarray(known & rest)
 
 
-def _held(command: Series) -> tuple[FloatArray, FloatArray]:
-    """Return times (m,) and how far commands that are held until the next have asked to go and turn, (m, 2)."""
-    t = np.append(command.t, command.t[-1] + LONGEST_HOLD)
-    steps = np.diff(t)[:, None] * np.column_stack([command.column(name) for name in "vw"])
-    whole = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
-    # What is held for long has no gap.
-    fine = np.arange(t[0], t[-1], _GAP / 2)
-    both = np.unique(np.concatenate([t, fine]))
-    return both, np.column_stack([np.interp(both, t, column) for column in whole.T])
+def _asked(command: Series, at: FloatArray) -> FloatArray:
+    """Return the mean |v| + |w| asked for about times (n,), each command held until the next, (n,)."""
+    return of_input(command.t, np.abs(np.column_stack([command.column(name) for name in "vw"])), at).values.sum(axis=1)
 
 
 def with_yaw_rate(run: Run, axis: str | None = None) -> tuple[Run, list[str]]:
@@ -267,7 +211,7 @@ def heading(imu: Series) -> FloatArray:
 
 
 def _yaw_rate(run: Run, imu: Series, axis: str | None) -> tuple[Series, str]:
-    if len(imu.t) < _FEWEST_ROWS or len(at := grid(imu.t)) < _FEWEST_ROWS:
+    if len(imu.t) < _FEWEST_ROWS or len(at := grid(imu.t[0], imu.t[-1])) < _FEWEST_ROWS:
         raise UnusableError(f"it has {len(imu.t)} rows over {imu.t[-1] - imu.t[0]:.3g} s")
     rows = _columns(imu, RATES)
     known = [name for name in (*RATE, *RATES) if name in imu.columns]
@@ -283,7 +227,7 @@ def _yaw_rate(run: Run, imu: Series, axis: str | None) -> tuple[Series, str]:
     ours = imu.columns[0] == RATE[0]
     if ours:
         rows[:, 2] = imu.column(RATE[0])
-    rates = means(imu.t, rows, at)
+    rates = of_samples(imu.t, rows, at)
     mounting = found(rates, others, None if ours else _gravity(imu, at, rest), _given(axis, ours=ours))
     w, bias = _without_bias(rates @ mounting.up, rest & np.isfinite(rates).all(axis=1), others[0].w, mounting)
     words = f"{mounting.name} is up ({mounting.why})" if not ours else f"w is the robot's yaw rate, {mounting.why}"
@@ -304,12 +248,14 @@ def _columns(imu: Series, names: tuple[str, ...]) -> FloatArray:
 
 
 def _gravity(imu: Series, at: FloatArray, rest: BoolArray) -> FloatArray | None:
+    """Return the mean acceleration (3,) [m/s^2] at rest, if the robot ever does, where it can be gravity's."""
     if not set(ACCELERATIONS) <= set(imu.columns):
         return None
-    felt = means(imu.t, _columns(imu, ACCELERATIONS), at)
+    felt = of_samples(imu.t, _columns(imu, ACCELERATIONS), at)
     use = np.isfinite(felt).all(axis=1)
     use = use & rest if (use & rest).any() else use
-    return gravity_of(felt[use]) if use.any() else None
+    mean = np.asarray(felt[use].mean(axis=0)) if use.any() else np.zeros(3)
+    return mean if _GRAVITY[0] < np.linalg.norm(mean) < _GRAVITY[1] else None
 
 
 def _without_bias(w: FloatArray, rest: BoolArray, turning: FloatArray, mounting: Mounting) -> tuple[float, str]:

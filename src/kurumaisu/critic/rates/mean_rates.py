@@ -10,7 +10,7 @@ from scipy.signal import fftconvolve
 
 from kurumaisu import geometry
 from kurumaisu.critic.values.recording import LONGEST_HOLD, Series
-from kurumaisu.types import FloatArray
+from kurumaisu.types import BoolArray, FloatArray
 
 STEP = 0.1  # [s] of the grid
 SPAN = 1.0  # [s] over which rates are averaged: what lags and a noisy reference do to them is then small
@@ -37,10 +37,30 @@ def of_poses(pose: Series, t: FloatArray) -> Rates:
     turn = step[:, 2]
     forward = np.cos(turn / 2) * step[:, 0] + np.sin(turn / 2) * step[:, 1]
     rates = np.column_stack([forward / np.maximum(np.sinc(turn / (2 * np.pi)), 0.3), turn]) / SPAN
-    holes = np.flatnonzero(np.diff(pose.t) > max(SPAN / 2, 2.5 * float(np.median(np.diff(pose.t)))))
-    for hole in holes:
-        rates[(t + SPAN / 2 > pose.t[hole]) & (t - SPAN / 2 < pose.t[hole + 1])] = np.nan
+    rates[_across_gaps(pose.t, t)] = np.nan
     return Rates(t, rates)
+
+
+def of_integral(times: FloatArray, whole: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the mean rates (n, k) of what is `whole` (m, k) at times (m,); nan before, after and across gaps."""
+    a, b = t - SPAN / 2, t + SPAN / 2
+    rates = np.column_stack([np.interp(b, times, column) - np.interp(a, times, column) for column in whole.T]) / SPAN
+    rates[(a < times[0] - STEP) | (b > times[-1] + STEP) | _across_gaps(times, t)] = np.nan
+    return rates
+
+
+def of_samples(times: FloatArray, values: FloatArray, t: FloatArray) -> FloatArray:
+    """Return the means (n, k) of what was measured (m, k) at times (m,), straight between them; nan likewise."""
+    steps = (values[1:] + values[:-1]) / 2 * np.diff(times)[:, None]
+    return of_integral(times, np.vstack([np.zeros(values.shape[1]), np.cumsum(steps, axis=0)]), t)
+
+
+def _across_gaps(times: FloatArray, t: FloatArray) -> BoolArray:
+    """Return which spans about t (n,) reach into a gap of times (m,) that is longer than half of SPAN, (n,)."""
+    out = np.zeros(len(t), dtype=np.bool_)
+    for gap in np.flatnonzero(np.diff(times) > max(SPAN / 2, 2.5 * float(np.median(np.diff(times))))):
+        out |= (t + SPAN / 2 > times[gap]) & (t - SPAN / 2 < times[gap + 1])
+    return out
 
 
 def of_input(times: FloatArray, values: FloatArray, t: FloatArray) -> Rates:
@@ -61,12 +81,13 @@ def of_input(times: FloatArray, values: FloatArray, t: FloatArray) -> Rates:
 class ShiftCorrelation:
     """How alike two rates are.
 
-    correlation (k,) at lags (k,) [s] by which the second is early, 0 where too little is known; number (k,) of
-    independent samples behind each.
+    correlation (k,) at lags (k,) [s] by which the second is early, 0 where too little is known; slope (k,) of the first
+    over the second, likewise; number (k,) of independent samples behind each.
     """
 
     lags: FloatArray
     correlation: FloatArray
+    slope: FloatArray
     number: FloatArray
 
     @property
@@ -97,7 +118,8 @@ def shift_correlation(a: FloatArray, b: FloatArray, least: tuple[float, float], 
     alive = (xx > least[0] ** 2) & (yy > least[1] ** 2) & (number * STEP > max(10.0, 0.4 * n * STEP))
     with np.errstate(invalid="ignore", divide="ignore"):
         correlation = np.where(alive, xy / np.sqrt(np.maximum(xx * yy, 1e-300)), 0.0)
-    return ShiftCorrelation(lags, np.clip(correlation, -1, 1), number * STEP / SPAN)
+        slope = np.where(alive, xy / yy, 0.0)
+    return ShiftCorrelation(lags, np.clip(correlation, -1, 1), slope, number * STEP / SPAN)
 
 
 def _centred(a: FloatArray) -> FloatArray:
