@@ -170,8 +170,8 @@ def test_clocks_that_agree_at_the_first_scan_are_no_delay(first, delay, named):
     late = Cause("laser.latency", 1.0, {"delay": Estimate(delay, delay - 4e-4, delay + 4e-4, "s")}, 50.0)
     drift = Cause("laser.clock_skew", 1.0, {"skew": Estimate(4e-4, 3.9e-4, 4.1e-4, "1")}, 50.0)
     settings = (EffectSetting("laser.latency", {"delay": delay}), EffectSetting("laser.clock_skew", {"skew": 4e-4}))
-    told = without_double_delay(LaserFinding(causes=(late, drift), settings=settings), first + np.arange(9.0))
+    told = without_double_delay(LaserFinding(causes=(late, drift), settings=settings), first + np.arange(9.0), MODEL)
     assert [cause.id for cause in told.causes] == ["laser.latency", "laser.clock_skew"][1 - named :]
     assert told.settings == settings
     assert bool(told.details) != named
-    assert without_double_delay(LaserFinding(causes=(late,)), first + np.arange(9.0)).causes == (late,)
+    assert without_double_delay(LaserFinding(causes=(late,)), first + np.arange(9.0), MODEL).causes == (late,)

@@ -27,15 +27,11 @@ from kurumaisu.types import FloatArray
 
 _SAME = 3.0  # sds by which two sizes may differ: those of two faults would hardly be opposite so closely
 _SHIFT = 1e-6  # [m, rad] below which nothing is elsewhere
-
-_Place = Callable[[Mapping[str, float]], FloatArray]
 _NEAR = 5.0  # [s] of the first scan: so long before or after it a recording may have begun
-_SURE = 1.8  # times half of a 90 % interval: three standard deviations
-_LATER = 1000.0  # [s] at which a clock's drift is looked at
+_ENDS = np.array([0.0, 1000.0])  # [s] at which clocks are compared
 _NONE = 1e-9  # [s] a shift that is none
 
 Look = Callable[[Recording], LaserFinding]
-_Times = Callable[[FloatArray, float], FloatArray]
 
 
 def from_base_link(
@@ -68,13 +64,9 @@ def is_point(name: str) -> bool:
 
 def mountings(model: Model) -> frozenset[str]:
     """Return the effects that put the laser elsewhere."""
-    out = set()
-    for effect in effects.LASER:
-        place = _placed_by(effect.id, model)
-        null, usual = ({p.name: p.null + far * p.scale for p in effect.parameters} for far in (0.0, 1.0))
-        if place is not None and np.abs(place(usual) - place(null)).max() > _SHIFT:
-            out.add(effect.id)
-    return frozenset(out)
+    return frozenset(
+        each.id for each in effects.LASER if np.abs(_off(each.id, _usual(each.id), model)[0]).max() > _SHIFT
+    )
 
 
 def ruled_out(
@@ -132,87 +124,67 @@ class _Shift:
 
 def _shift(cause: Cause, model: Model) -> _Shift | None:
     """Return by how much a cause shifts the reference's point or the laser; None where it shifts neither."""
-    effect, place = effects.by_id(cause.id), _placed_by(cause.id, model)
-    if place is None:
-        return None
-    nulls = {p.name: p.null for p in effect.parameters}
-    middle = nulls | {name: known.estimate for name, known in cause.parameters.items()}
-    by = place(middle) - place(nulls)
+    middle = _values(cause)
+    by, _ = _off(cause.id, middle, model)
     if np.abs(by).max() < _SHIFT:
         return None  # a clock, or a tilt
-    widths = [
-        place({**middle, name: known.hi90}) - place({**middle, name: known.lo90})
-        for name, known in cause.parameters.items()
-    ]
+    ends = [[{**middle, name: end} for end in (known.lo90, known.hi90)] for name, known in cause.parameters.items()]
+    widths = [_off(cause.id, high, model)[0] - _off(cause.id, low, model)[0] for low, high in ends]
     return _Shift(by, np.sqrt(np.sum(np.square(widths), axis=0)) / (2 * NORMAL90))
 
 
-def _placed_by(name: str, model: Model) -> _Place | None:
-    """Return where an effect of some values puts what was in the origin (3,); None if it is of no such kind."""
+def _values(cause: Cause, end: str = "estimate") -> dict[str, float]:
+    return {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
+
+
+def _usual(name: str) -> dict[str, float]:
+    return {p.name: p.null + p.scale for p in effects.by_id(name).parameters}
+
+
+def _off(name: str, values: Mapping[str, float], model: Model) -> tuple[FloatArray, FloatArray]:
+    """Return how far an effect moves what is in the origin (3,), and puts stamps off at _ENDS (2,) [s]."""
+    place, stamps = _applied(name, values, _ENDS, model)
+    return place, stamps - _ENDS
+
+
+def _applied(name: str, values: Mapping[str, float], stamps: FloatArray, model: Model) -> tuple[FloatArray, FloatArray]:
+    """Return what an effect makes of the origin (3,) at the first stamp, and of stamps (n,) [s] of a drive since then.
+
+    values: of its parameters; the others are null. What acts on neither the reference nor on beams changes nothing.
+    """
     effect, rng = effects.by_id(name), np.random.default_rng(0)
+    every = {p.name: p.null for p in effect.parameters} | dict(values)
     if issubclass(effect, ReferenceEffect):
-        context = Context(model.translation, model.steering, rng)
-        origin = Reference(np.zeros(()), np.zeros(3), np.zeros(3))
-        return lambda values: effect(values, context).apply(origin).poses
+        none = np.zeros((len(stamps), 3))
+        measures = effect(every, Context(model.translation, model.steering, rng))
+        seen = measures.apply(Reference(stamps, none, none, float(stamps[0])))
+        return seen.poses[0], seen.times
     if issubclass(effect, BeamEffect):
-        return lambda values: effect(values, rng).apply(Beams.single()).mount
-    return None
+        fires = effect(every, rng)
+        beams = [fires.apply(Beams.single(stamp)) for stamp in stamps.tolist()]
+        return beams[0].mount, np.array([float(beam.times[0]) for beam in beams])
+    return np.zeros(3), stamps
 
 
-@dataclass(frozen=True)
-class _Clock:
-    """By how much a cause moves the time of a scan: at [s] time 0; growth [1] since then; half of its interval [s]."""
-
-    at: float
-    growth: float
-    half: float
-
-
-def without_double_delay(finding: LaserFinding, stamps: FloatArray) -> LaserFinding:
+def without_double_delay(finding: LaserFinding, stamps: FloatArray, model: Model) -> LaserFinding:
     """Return a finding without a cause of its own for a delay that only says that the clocks agreed at the first scan.
 
     stamps [s] of the scans, since time 0 of the laser. The model keeps the delay: its clocks agree at time 0.
     """
     first = float(stamps.min())
-    if first < _NEAR:
+    off = [(cause, *_off(cause.id, _values(cause), model)[1].tolist()) for cause in finding.causes]
+    running = [one for one in off if abs(one[2] - one[1]) > _NONE]
+    delays = [one for one in off if abs(one[2] - one[1]) <= _NONE < abs(one[1])]
+    if first < _NEAR or len(running) != 1 or len(delays) != 1:
         return finding
-    clocks = {cause.id: _clock(cause) for cause in finding.causes}
-    running = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER > _NONE]
-    delays = [(name, clock) for name, clock in clocks.items() if clock and abs(clock.growth) * _LATER <= _NONE]
-    if len(running) != 1 or len(delays) != 1:
+    (drift, early, late), (delay, by, _) = running[0], delays[0]
+    growth = (late - early) / (_ENDS[1] - _ENDS[0])
+    agreed = -(by + early) / growth
+    low, high = (float(_off(delay.id, _values(delay, end), model)[1][0]) for end in ("lo90", "hi90"))
+    if abs(agreed - first) > _NEAR + _SAME * abs(high - low) / (2 * NORMAL90) / abs(growth):
         return finding
-    (drifting, drift), (late, delay) = *running, *delays
-    agreed = -(delay.at + drift.at) / drift.growth
-    if abs(agreed - first) > _NEAR + _SURE * delay.half / abs(drift.growth):
-        return finding
-    told = f"{drifting}: the clocks agreed {agreed:.3g} s after time 0; the model has this as a delay."
-    return replace(finding, causes=tuple(c for c in finding.causes if c.id != late), details=(*finding.details, told))
-
-
-def _drifts(name: str) -> bool:
-    """Return whether an effect of a usual size lets the time of a scan drift."""
-    effect = effects.by_id(name)
-    if not issubclass(effect, BeamEffect):
-        return False
-    usual = effect({p.name: p.null + p.scale for p in effect.parameters}, np.random.default_rng(0))
-    early, late = (float(usual.apply(Beams.single(stamp)).times[0]) - stamp for stamp in (0.0, _LATER))
-    return abs(late - early) > _NONE
-
-
-def _clock(cause: Cause) -> _Clock | None:
-    """Return what a cause does to the time of a whole scan; None if that is nothing."""
-    effect = effects.by_id(cause.id)
-    if not issubclass(effect, BeamEffect):
-        return None
-
-    def shift(stamp: float, end: str = "estimate") -> float:
-        values = {p.name: p.null for p in effect.parameters}
-        values |= {name: float(getattr(one, end)) for name, one in cause.parameters.items()}
-        return float(effect(values, np.random.default_rng(0)).apply(Beams.single(stamp)).times[0]) - stamp
-
-    at, growth = shift(0.0), (shift(_LATER) - shift(0.0)) / _LATER
-    half = abs(shift(0.0, "hi90") - shift(0.0, "lo90")) / 2
-    return _Clock(at, growth, half) if max(abs(at), abs(growth) * _LATER) > _NONE else None
+    told = f"{drift.id}: the clocks agreed {agreed:.3g} s after time 0; the model has this as a delay."
+    return replace(finding, causes=tuple(c for c in finding.causes if c is not delay), details=(*finding.details, told))
 
 
 def by_its_clock(
@@ -223,51 +195,40 @@ def by_its_clock(
     causes: of the drives; finding: of the scans as they are; look: criticises the scans of a recording. If the laser's
     clock still drifts then, it does so by itself, and the finding is what it was.
     """
-    known = [(cause.id, {name: one.estimate for name, one in cause.parameters.items()}) for cause in causes]
-    told = next(((name, times) for name, v in known if (times := _stamped_by(name, v, model)) is not None), None)
-    if told is None or not _drifting(finding):
+    told = next((cause for cause in causes if _runs(cause.id, _values(cause), model)), None)
+    if told is None or not _drifting(finding, model):
         return finding, recording
-    name, times = told
     first = min((float(run.pose.t[0]) for run in recording.runs if run.pose is not None), default=0.0)
-    stamped = replace(recording, runs=tuple(_restamped(run, times, first) for run in recording.runs))
+    stamped = replace(recording, runs=tuple(_restamped(run, told, first, model) for run in recording.runs))
     again = look(stamped)
-    if again.refused is not None or again.wrong is not None or _drifting(again):
+    if again.refused is not None or again.wrong is not None or _drifting(again, model):
         return finding, recording
-    words = f"laser: by the reference its clock seems to drift; the cause is {name}, not the laser's clock."
+    words = f"laser: by the reference its clock seems to drift; the cause is {told.id}, not the laser's clock."
     return replace(again, details=(*again.details, words)), stamped
 
 
-def _drifting(finding: LaserFinding) -> bool:
-    named = [cause.id for cause in finding.causes]
-    return any(_drifts(name) for name in (*named, *(name for group in finding.confounded for name in group)))
+def _drifting(finding: LaserFinding, model: Model) -> bool:
+    """Tell whether an effect by which a scan's time drifts is named, or may act."""
+    named = [*(cause.id for cause in finding.causes), *(name for group in finding.confounded for name in group)]
+    return any(abs(np.diff(_off(name, _usual(name), model)[1])[0]) > _NONE for name in named)
 
 
 def by_commands(settings: Settings, model: Model) -> Settings:
     """Return settings for a reference that is stamped by the commands' clock."""
-    return tuple(one for one in settings if _stamped_by(one.id, one.parameters, model) is None)
+    return tuple(one for one in settings if not _runs(one.id, one.parameters, model))
 
 
-def _stamped_by(name: str, values: Mapping[str, float], model: Model) -> _Times | None:
-    """Return the stamps that a reference gives to times, as its drive began at a time; None if they are the same."""
-    effect = effects.by_id(name)
-    if not issubclass(effect, ReferenceEffect):
-        return None
-    context = Context(model.translation, model.steering, np.random.default_rng(0))
-    values = {p.name: p.null for p in effect.parameters} | dict(values)
-
-    def stamped(times: FloatArray, start: float) -> FloatArray:
-        none = np.zeros((*times.shape, 3))
-        return effect(values, context).apply(Reference(times, none, none, start)).times
-
-    return stamped if abs(stamped(np.array([0.0, _LATER]), 0.0)[1] - _LATER) > _NONE else None
+def _runs(name: str, values: Mapping[str, float], model: Model) -> bool:
+    """Tell whether a reference with this effect gives other stamps, in the end."""
+    return bool(abs(_off(name, values, model)[1][1]) > _NONE)
 
 
-def _restamped(run: Run, times: _Times, first: float) -> Run:
+def _restamped(run: Run, clock: Cause, first: float, model: Model) -> Run:
     """Return a run whose reference has the stamps of the others' clock; first [s]: of all runs."""
     if run.pose is None:
         return run
     since = run.pose.t - first
     ends = np.array([since[0], since[-1] + 1.0])
-    low, high = times(ends, float(since[0]))
+    low, high = _applied(clock.id, _values(clock), ends, model)[1]
     slope = (high - low) / (ends[1] - ends[0])
     return replace(run, pose=replace(run.pose, t=first + ends[0] + (since - low) / slope))

@@ -125,8 +125,7 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
     fit = refitted(assembly, normal, made, recording.truth)
     if (lead := _certain_lead(model, assembly, normal, made, fit)) is not None:
         evidence = (min(made.found.p[lead[0].id], 1.0), gain_of(made, lead[0].id))
-        for rest in question.beside(lead[0]):
-            yield _with_rest(assembly, normal, lead, evidence, rest)
+        yield from _with_rest(question, assembly, normal, lead, evidence)
         return
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     if recording.truth is not None:
@@ -166,8 +165,7 @@ def _large_effect_first(
     form = next(form for form in assembly.forms if form.id == far.id)
     (placed,) = fit_parameters(assembly, normal, [form], [far], None, {}, question.recording.truth).settings
     evidence = (1.0, FormSearch([form], normal.gram).run().best.log_likelihood)
-    for rest in question.beside(placed[0]):
-        yield _with_rest(assembly, normal, placed, evidence, rest)
+    yield from _with_rest(question, assembly, normal, placed, evidence)
 
 
 def _searched(
@@ -200,7 +198,8 @@ def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
     own = own_sd(question.model.effects)
     scatter = scatter_effects(mean, question.recording, question.ids, own)
     heard = replace(scatter, effects=material(scatter, normal, own))
-    finding = without_double_delay(_finding(assembly, normal, made, mean.fit, heard), assembly.shots.stamps)
+    finding = _finding(assembly, normal, made, mean.fit, heard)
+    finding = without_double_delay(finding, assembly.shots.stamps, question.model)
     slight = tuple(each.setting.id for each in scatter.effects if each not in heard.effects)
     words = tuple(f"{name}: detectable, but too small to matter." for name in slight)
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
@@ -210,24 +209,25 @@ def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
 
 
 def _with_rest(
+    question: _Question,
     assembly: Assembly,
     normal: NormalEquations,
     lead: tuple[EffectSetting, dict[str, float]],
     evidence: tuple[float, float],
-    rest: LaserFinding,
-) -> LaserFinding:
-    """Return an effect, which must be in place before the rest can be seen, with the rest that was found then.
+) -> Iterator[LaserFinding]:
+    """Yield an effect, which must be in place before the rest can be seen, with what else is found then.
 
     lead: its setting, and the sds of what was fitted; evidence: its posterior, and the log evidence of it [nat].
     """
     setting, sds = lead
     cause = Cause(setting.id, evidence[0], estimates_of(setting, sds), evidence[1])
     size = size_of(assembly.marks.together([setting])[normal.beam_noise.valid])
-    said = tuple(line for line in rest.details if not line.startswith(f"{setting.id}: "))  # of what was left of it
-    found = with_dominant(replace(rest, details=said), setting, cause, assembly, normal)
-    if any(each.id == setting.id for each in found.causes):
-        found = replace(found, details=(*said, *_sentences({setting.id: size}, ())))
-    return without_double_delay(found, assembly.shots.stamps)
+    for rest in question.beside(setting):
+        said = tuple(line for line in rest.details if not line.startswith(f"{setting.id}: "))  # of what was left of it
+        found = with_dominant(replace(rest, details=said), setting, cause, assembly, normal)
+        if any(each.id == setting.id for each in found.causes):
+            found = replace(found, details=(*said, *_sentences({setting.id: size}, ())))
+        yield without_double_delay(found, assembly.shots.stamps, question.model)
 
 
 def _next(finding: LaserFinding, assembly: Assembly, recording: Recording, model: Model) -> NextExperiment | None:
