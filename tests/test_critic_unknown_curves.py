@@ -99,7 +99,7 @@ def test_a_curve_and_an_effect_of_the_catalogue_are_fitted_together():
     extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
     assert extension.fit.values[0] == pytest.approx(0.06, abs=4 * extension.fit.sds[0])
     assert sentences.shape(extension).startswith("periodic, period 2 pi/3, amplitude")
-    size = shapes.shape_of(extension).size
+    size = shapes.shape_of(extension.drawn).size
     assert size[1] < abs(case.size) * 1.05
     assert size[2] > abs(case.size) * 0.95
     left = [d.measured - problem.simulated(d, extension.settings) for d in problem.drives]
@@ -143,7 +143,7 @@ def drawn(law, sd):
     ],
 )
 def test_shapes_are_told_with_place_and_size(law, kind, place, size):
-    found = shapes.shape_of(drawn(law, 0.001))
+    found = shapes.shape_of(drawn(law, 0.001).drawn)
     assert found.kind == kind
     assert found.place[0] == pytest.approx(place, abs=0.35)
     assert found.size[0] == pytest.approx(size, rel=0.15)

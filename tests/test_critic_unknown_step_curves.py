@@ -45,7 +45,7 @@ def test_a_jump_beats_an_effect_that_has_a_corner_near_by(slipping):
 def test_a_jump_is_told_and_written_where_it_is(slipping):
     best = curves_beside_nothing(slipping)[0]
     extension = fit_with_curve(slipping, best.fit, best.curve, best.evidence.prior)
-    found = shapes.shape_of(extension)
+    found = shapes.shape_of(extension.drawn)
     assert found.place[1] - 0.01 < 0.4 < found.place[2] + 0.01  # these drives have no rate just there
     assert found.place[1] <= found.place[0] <= found.place[2]
     assert found.place[2] - found.place[1] < 0.06
@@ -55,7 +55,7 @@ def test_a_jump_is_told_and_written_where_it_is(slipping):
     moved = effects.by_id(extension.unknown.id)(extension.unknown.parameters, None).apply(effects.Motion(0.01, v, w))
     np.testing.assert_allclose(moved.w / w - 1, extension.coefficients[[0, 1, 1]], atol=1e-12)
     assert abs(extension.coefficients[0]) < 0.05 < abs(extension.coefficients[1])
-    at = shapes.grid(extension)  # a picture has both sides of it
+    at = shapes.grid(extension.drawn)  # a picture has both sides of it
     assert {float(knot) for knot in best.curve.basis.knots} <= {float(x) for x in at}
 
 
@@ -94,7 +94,7 @@ def test_a_tyre_that_goes_flat_bends_the_way_from_then_on_and_is_no_veer(seed):
     assert (best.curve.id, best.fit.ids) == ("smooth.curvature.time", frozenset())
     assert found.p["base.veer"] < 0.1
     extension = fit_with_curve(problem, best.fit, best.curve, best.evidence.prior)
-    place = shapes.shape_of(extension).place
+    place = shapes.shape_of(extension.drawn).place
     assert place[1] - 0.2 < 25 < place[2] + 0.2
     assert sentences.channel(extension.curve) == "base.w"
     assert sentences.shape(extension, intervals=False).endswith(" rad/m")

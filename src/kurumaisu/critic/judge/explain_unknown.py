@@ -133,8 +133,8 @@ def figure(problem: Problem, extension: FitWithCurve) -> Misfit:
     )
     at_all = moments(problem.drives)
     x, residual, left = x[use], residual[use], left[use]
-    at = shapes.grid(extension)
-    mean, sd = shapes.band(extension, at)
+    at = shapes.grid(extension.drawn)
+    mean, sd = shapes.band(extension.drawn, at)
     return Misfit(
         channel=sentences.CHANNEL_NAMES[extension.curve.channel],
         unit=sentences.unit_of(extension.curve.channel),
@@ -163,7 +163,9 @@ def _samples(
     into = effects.CHANNELS[extension.curve.channel]
     channel = ("v", "lateral", "w").index(into.rate)
     motion = replay.motion(drive, problem.model, extension.fit.settings)
-    values = extension.curve.basis.samples(motion)
+    basis = extension.curve.basis
+    # A constant follows nothing, and is drawn over the time.
+    values = effects.Follower("time", 0.0).values(motion) if basis.size == 1 else basis.samples(motion)
     middle = np.clip(((drive.times[1:] + drive.times[:-1]) / 2 - drive.start) / GRID, 0, len(values) - 1).astype(int)
     dt = np.diff(drive.times)
     residual, left = (
@@ -171,8 +173,8 @@ def _samples(
         for settings in (extension.fit.settings, extension.settings)
     )
     x = values[middle]
-    if "period" in extension.curve.basis.constants:
-        x = np.mod(x, extension.curve.basis.constants["period"])
+    if "period" in basis.constants:
+        x = np.mod(x, basis.constants["period"])
     use = np.isfinite(x) & motion.moving[middle]
     if into.by:  # a share of a rate: of a small one nothing can be said
         rates = effects.factor(into, motion)[middle]

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import logsumexp
@@ -16,8 +16,8 @@ from kurumaisu.critic.ranges.search.normal_equations import NormalEquations
 from kurumaisu.critic.scatter.curves import ScatterCurve
 from kurumaisu.critic.scatter.scatter_search import ScatterEffect
 from kurumaisu.critic.unknown.bases import Basis
-from kurumaisu.critic.unknown.sentences import COVARIATES
-from kurumaisu.critic.unknown.shapes import grid, shape_of
+from kurumaisu.critic.unknown.sentences import COVARIATES, shape_over
+from kurumaisu.critic.unknown.shapes import DrawnCurve
 from kurumaisu.critic.values.criticism import UNKNOWN_CHANNEL, UNKNOWN_POSE, UNKNOWN_SCATTER, StandIn
 from kurumaisu.critic.values.policy import FORM_ERROR, NAMED
 from kurumaisu.critic.values.verdict import NORMAL90, Cause, Estimate, Unknown
@@ -154,15 +154,6 @@ def _joined(cause: Cause | None, scatter: ScatterEffect) -> Cause:
     return Cause(scatter.setting.id, max(min(scatter.p, 1.0), cause.p if cause is not None else 0.0), estimates, nats)
 
 
-@dataclass(frozen=True)
-class ReadingCurve:
-    """A curve with its coefficients (m,) and their covariance (m, m), as shapes describes it."""
-
-    basis: Basis
-    coefficients: FloatArray
-    covariance: FloatArray
-
-
 def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
     """Yield the curve that acts, and the next ones that could stand in for it."""
     seen: set[str] = set()
@@ -174,7 +165,7 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
         seen.add(rival.free.id)
         p = min(weighed.p[rival.free.id], 1.0)
         _, coefficients, covariance = block_evidence.fit_with_block(rival, gram)
-        curve = ReadingCurve(basis, 1e3 * coefficients, 1e6 * covariance)
+        curve = DrawnCurve(basis, 1e3 * coefficients, 1e6 * covariance)
         channel, unit = (UNKNOWN_CHANNEL, "mm") if rival.free.pose is None else UNKNOWN_POSE[rival.free.pose]
         yield Unknown(channel, _called(basis), shape(curve, unit), p)
 
@@ -182,7 +173,7 @@ def unknowns(weighed: BlockComparison, gram: FloatArray) -> Iterator[Unknown]:
 def unknown_scatter(curves: Sequence[ScatterCurve]) -> Iterator[Unknown]:
     """Yield the curve that the noise of readings follows, and the next ones that could stand in for it."""
     for one in curves[:_LISTED]:
-        curve = ReadingCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
+        curve = DrawnCurve(one.basis, 100 * one.coefficients, 1e4 * one.covariance)
         yield Unknown(UNKNOWN_SCATTER, _called(one.basis), f"of the noise: {shape(curve, '%')}", one.p)
 
 
@@ -204,17 +195,8 @@ def _called(basis: Basis) -> str:
     return name.replace("_", " ") if name in effects.RANGE_COVARIATES else COVARIATES.get(name, (name,))[0]
 
 
-def shape(curve: ReadingCurve, of: str) -> str:
+def shape(curve: DrawnCurve, of: str) -> str:
     """Return a curve's shape with place and size, each with its 90 % interval; of: its unit."""
-    found, at = shape_of(curve), grid(curve)
-    basis = curve.basis
-    plain = "rad" if basis.covariate in effects.RANGE_COVARIATES else COVARIATES.get(basis.covariate, ("",))[-1]
-    unit = _UNITS.get(basis.covariate, plain)
-    size, low, high = np.abs(found.size) if found.kind == "line" else found.size
-    told = f"{size:.3g} {of} (90 %: {min(low, high):.3g} to {max(low, high):.3g})"
-    span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
-    if found.kind == "line":
-        return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {told} {span}"
-    if found.kind == "irregular":
-        return f"irregular, within {told} {span}"
-    return f"{found.kind} of {told} at {found.place[0]:.3g} {unit}".rstrip()
+    name = curve.basis.covariate
+    plain = "rad" if name in effects.RANGE_COVARIATES else COVARIATES.get(name, ("",))[-1]
+    return shape_over(curve, _UNITS.get(name, plain), of)

@@ -6,6 +6,8 @@ from __future__ import annotations
 import io
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,10 +68,7 @@ class Shown:
 
 def overlay_svg(overlay: Overlay, name: str) -> str:
     """Return the run from above; name: prefix of the ids inside, unique in the page."""
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
-        figure = Figure(figsize=(5.0, 4.1))
-        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
-        axes = figure.subplots()
+    with _drawn(name) as (figure, axes):
         axes.plot(*overlay.measured.T, color=INK, linewidth=2.6, alpha=0.55, label="measured")
         axes.plot(*overlay.baseline.T, color=BASELINE, linewidth=1.5, linestyle=(0, (4, 1.5)), label="original model")
         if overlay.extended is not None:
@@ -89,10 +88,7 @@ def misfit_svg(misfit: Misfit, shown: Shown, name: str) -> str:
     finite = misfit.covariate[np.isfinite(misfit.covariate)]
     x, x_unit = _axis(float(np.abs(finite).max(initial=0.0)), misfit.covariate_unit)
     y, y_unit = _axis(max(abs(shown.low), abs(shown.high)), misfit.unit)
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
-        figure = Figure(figsize=(5.0, 4.1))
-        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
-        axes = figure.subplots()
+    with _drawn(name) as (figure, axes):
         points = x * misfit.covariate[shown.index], y * misfit.residual[shown.index]
         axes.plot(*points, ".", color=INK, alpha=0.25, markersize=4.5, markeredgewidth=0, label="samples")
         axes.axhline(0.0, color=INK, linewidth=0.8)
@@ -118,10 +114,7 @@ def comparison_svg(comparison: Comparison, name: str) -> str:
     """Return by how much simulations with and without the extension miss the measured numbers; name as above."""
     most = np.argsort(-np.abs(comparison.measured - comparison.baseline) / comparison.sd)[:MOST_NUMBERS][::-1]
     rows = np.arange(len(most))
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
-        figure = Figure(figsize=(5.0, 4.1))
-        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
-        axes = figure.subplots()
+    with _drawn(name) as (figure, axes):
         axes.axvspan(-NORMAL90, NORMAL90, color=FAINT, linewidth=0)
         axes.axvline(0.0, color=INK, linewidth=0.8)
         for simulated, marker, colour, said in (
@@ -138,6 +131,15 @@ def comparison_svg(comparison: Comparison, name: str) -> str:
         axes.set_xlabel(f"measured {MINUS} simulated [sd]")
         _legend(figure, columns=2)
         return _svg(figure, name)
+
+
+@contextmanager
+def _drawn(name: str) -> Iterator[tuple[Figure, Any]]:
+    """Yield a figure and its axes, in the page's style; name as above."""
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": name}):
+        figure = Figure(figsize=(5.0, 4.1))
+        figure.set_layout_engine("constrained", rect=_BELOW_LEGEND)
+        yield figure, figure.subplots()
 
 
 def _means(axes: Any, bins: Bins, scale: tuple[float, float], marker: str, colour: str, label: str) -> None:

@@ -21,8 +21,7 @@ _TURN = 2 * np.pi
 _ROUNDING = 1e-6  # of a quantity's size: less spread is none
 # Before the data, neighbouring knots differ at random (1), or so do neighbouring slopes (2): rough or smooth.
 _ORDERS = (1, 2)
-FINER = 4  # knots, or waves, for one
-_FINE = 3  # the same, of curves that the data may well bend so often
+_FINE = 3  # knots, or waves, for one, of curves that the data may well bend so often
 OFFSET_CHANNELS = (
     "v",
     "lateral",
@@ -34,7 +33,8 @@ OFFSET_CHANNELS = (
 class Basis:
     """The curves over one covariate.
 
-    knots: of the hats, empty where periodic; constants: the parameter that the covariate needs to be computed, if any;
+    knots: of the hats, empty where periodic, one of a constant, which is pictured over the time;
+    constants: the parameter that the covariate needs to be computed, if any;
     priors: covariances of the coefficients, (k, k) each, of a curve whose mean square over the drives is 1;
     low, high: the covariate lies between them in 95 % of the time that the chair moves. ways: out of how many like it
     this one was chosen by the data; harmonics: waves of a periodic one.
@@ -60,6 +60,8 @@ class Basis:
 
     def matrix(self, at: FloatArray) -> FloatArray:
         """Return the basis at values of the covariate (n,), (n, k)."""
+        if len(self.knots) == 1:
+            return np.ones((len(at), 1))
         if len(self.knots):
             inside = np.clip(at, self.knots[0], self.knots[-1])
             below = np.clip(np.searchsorted(self.knots, inside, side="right") - 1, 0, len(self.knots) - 2)
@@ -70,21 +72,15 @@ class Basis:
         phase = np.multiply.outer(_TURN * at / self.constants.get("period", 0.0), np.arange(1, self.harmonics + 1))
         return np.column_stack([np.ones(len(at)), np.cos(phase), np.sin(phase)])
 
-    def finer(self, times: int = FINER) -> Basis:
-        """Return the curves over the same with that many knots for one, or waves, which hold these; without a prior."""
-        count = len(self.knots)
-        if not count:
-            return replace(self, harmonics=times * self.harmonics, priors=())
-        at = np.linspace(0, count - 1, times * (count - 1) + 1)
-        knots = np.interp(at, np.arange(count), self.knots)
-        return replace(self, knots=knots, priors=())
-
     def fine(self, motions: Sequence[effects.Motion]) -> Basis | None:
-        """Return the curves over the same that bend more often, with their prior over these motions.
+        """Return the curves over the same that bend _FINE times as often, with their prior over these motions.
 
         None where these do not vary in it between the knots: effects may have moved a single speed beyond them.
         """
-        finer = self.finer(_FINE)
+        count = len(self.knots)
+        at = np.linspace(0, count - 1, _FINE * (count - 1) + 1) if count else np.empty(0)
+        knots = np.interp(at, np.arange(count), self.knots) if count else self.knots
+        finer = replace(self, knots=knots, harmonics=_FINE * self.harmonics, priors=())
         matrix = finer.matrix(np.concatenate([finer.samples(motion)[motion.moving] for motion in motions]))
         if np.ptp(matrix, axis=0).max() <= _ROUNDING:
             return None
@@ -190,32 +186,6 @@ def _walk(knots: FloatArray, order: int) -> FloatArray:
     return np.asarray(low if order == 1 else np.outer(s, s) + low**2 * (3 * high - low) / 6 * 4)
 
 
-@dataclass(frozen=True)
-class Offset(Basis):
-    """One number. What it is pictured over is the time, between low and high."""
-
-    @property
-    def size(self) -> int:
-        """Return the number of coefficients."""
-        return 1
-
-    def samples(self, motion: effects.Motion) -> FloatArray:
-        """Return the time since the start (n,) [s]."""
-        return effects.Follower("time", 0.0).values(motion)
-
-    def matrix(self, at: FloatArray) -> FloatArray:
-        """Return ones, (n, 1)."""
-        return np.ones((len(at), 1))
-
-    def finer(self, times: int = FINER) -> Basis:
-        """Return the same: a number has no knots between its knots."""
-        return self
-
-    def parameters(self, coefficients: FloatArray) -> dict[str, float]:
-        """Return the parameters as a model file has them."""
-        return {"knot_0": 0.0, "value_0": float(coefficients[0])}
-
-
-def constant_offset(seconds: float) -> Offset:
-    """Return the number, as known of drives of so many seconds."""
-    return Offset(effects.MOVING, np.empty(0), {}, (np.eye(1),), 0.0, seconds)
+def constant(seconds: float) -> Basis:
+    """Return one number while the chair moves, as known of drives of so many seconds."""
+    return Basis(effects.MOVING, np.zeros(1), {}, (np.eye(1),), 0.0, seconds)

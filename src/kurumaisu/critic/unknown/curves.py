@@ -19,7 +19,7 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import GRID, Drive, edges_of
 from kurumaisu.critic.base.sensitivity import Sensitivity, reference_increments
 from kurumaisu.critic.engine.evidence import Problem
-from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant_offset, root_of
+from kurumaisu.critic.unknown.bases import OFFSET_CHANNELS, Basis, bases, constant, root_of
 from kurumaisu.critic.values.policy import Z_HIGH, Z_LOW, Z_USUAL
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
@@ -85,7 +85,7 @@ class Design:
         end = max((float(drive.times[-1] - drive.start) for drive in problem.drives), default=0.0)
         for channel in OFFSET_CHANNELS if self.curves else ():
             if effects.smooth_id(channel, effects.MOVING) not in taken:
-                self.curves.append(Curve(channel, constant_offset(end), slice(at, at + 1)))
+                self.curves.append(Curve(channel, constant(end), slice(at, at + 1)))
                 at += 1
         self.columns = columns(problem, settings, self.curves)
         self.single = self.columns.astype(np.float32)
@@ -199,14 +199,19 @@ def wave_periods(problem: Problem, settings: Sequence[EffectSetting]) -> dict[st
     found = {}
     for name, kind in WAVES.items():
         along = [effects.Follower(name, 0.0).values(motion) for motion in motions]
-        sought = _PeriodSearch(problem, list(zip(problem.drives, sensitive, along, white, strict=True)))
-        period = _wave_period(sought, kind, max((float(np.ptp(one)) for one in along if len(one)), default=0.0))
+        sought = list(zip(problem.drives, sensitive, along, white, strict=True))
+        far = max((float(np.ptp(one)) for one in along if len(one)), default=0.0)
+        period = _wave_period(problem, sought, kind, far)
         if period is not None:
             found[name] = period
     return found
 
 
-def _wave_period(sought: _PeriodSearch, kind: Wave, far: float) -> tuple[float, int] | None:
+# A drive with how it reacts, the covariate along it, and what is left of it, whitened.
+_Along = tuple[Drive, Sensitivity, FloatArray, FloatArray]
+
+
+def _wave_period(problem: Problem, drives: Sequence[_Along], kind: Wave, far: float) -> tuple[float, int] | None:
     """Return the period that explains most, and out of how many; far: as a drive goes at most."""
     shortest, longest, channels = kind
     if far < _TURNS * shortest:
@@ -215,57 +220,52 @@ def _wave_period(sought: _PeriodSearch, kind: Wave, far: float) -> tuple[float, 
     # Over more of the way than this, so many periods would be out of step with one between them.
     part = min(far, 0.5 * _MOST / (high - low))
     waves = np.linspace(low, high, max(int(2 * part * (high - low)), 2))
-    gained = np.stack([sought.gained(channel, waves, 1, part) for channel in channels])
+    gained = np.stack([_gained(problem, drives, channel, waves, 1, part) for channel in channels])
     channel, best = np.unravel_index(int(np.argmax(gained)), gained.shape)
     # What comes once per turn, but briefly, has overtones as large, any of which may stand out.
     times = int(np.ceil(_CLOSER * far / part))
     apart, closer = waves[1] - waves[0], np.arange(-times, times + 1) / times
     near = [(waves[best] + apart * closer) / turns for turns in _PARTS]
     near = [some[(some >= low) & (some <= high)] for some in near]
-    found = [(wave, sought.gained(channels[channel], wave, _OVERTONES)) for wave in near if len(wave) > 1]
+    found = [(w, _gained(problem, drives, channels[channel], w, _OVERTONES, np.inf)) for w in near if len(w) > 1]
     likeliest, _ = max(((wave[np.argmax(g)], g.max()) for wave, g in found), key=lambda one: one[1])
     return float(1 / likeliest), round(gained.size * far / part)
 
 
-class _PeriodSearch:
-    """What is left about simulated drives, whitened, and what waves over a covariate explain of it."""
+def _gained(
+    problem: Problem, drives: Sequence[_Along], channel: str, waves: FloatArray, overtones: int, part: float
+) -> FloatArray:
+    """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,).
 
-    def __init__(self, problem: Problem, drives: Sequence[tuple[Drive, Sensitivity, FloatArray, FloatArray]]) -> None:
-        """Take drives with how they react, the covariate, and what is left."""
-        self._problem, self._drives = problem, drives
-
-    def gained(self, channel: str, waves: FloatArray, overtones: int, part: float = np.inf) -> FloatArray:
-        """Return the squares that each of evenly spaced waves, with as many overtones, explains in a channel, (n,).
-
-        part: of the covariate, in whose next one a wave may have any other phase.
-        """
-        size = 2 * overtones
-        grams: dict[int, FloatArray] = {}
-        pulls: dict[int, FloatArray] = {}
-        for drive, sensitivity, way, white in self._drives:
-            middles = (0.5 * (drive.times[1:] + drive.times[:-1]) - drive.start) / GRID
-            parts = np.repeat(np.floor(way[np.clip(middles.astype(int), 0, len(way) - 1)] / part), 3).astype(int)
-            tones = zip(*(_waves(way, times * waves) for times in range(1, overtones + 1)), strict=True)
-            at = 0
-            for some in tones:
-                here = slice(at, at + some[0].shape[1] // 2)
-                at = here.stop
-                # (rows, waves, cosines and sines of all tones)
-                whole = [
-                    self._problem.whitened(drive, sensitivity.increments(channel, tone)).reshape(len(white), -1, 2)
-                    for tone in some
-                ]
-                both = whole[0] if overtones == 1 else np.concatenate(whole, axis=2)
-                for key in np.unique(parts).tolist():
-                    own, left = both[parts == key], white[parts == key]
-                    gram = grams.setdefault(key, np.zeros((len(waves), size, size)))
-                    gram[here] += np.einsum("nki,nkj->kij", own, own)
-                    pulls.setdefault(key, np.zeros((len(waves), size)))[here] += np.einsum("nki,n->ki", own, left)
-        out = np.zeros(len(waves))
-        for key, pull in pulls.items():
-            along = np.linalg.solve(grams[key] + 1e-9 * np.eye(size), pull[..., None])[..., 0]
-            out += np.einsum("ki,ki->k", pull, along)
-        return out
+    part: of the covariate, in whose next one a wave may have any other phase.
+    """
+    size = 2 * overtones
+    grams: dict[int, FloatArray] = {}
+    pulls: dict[int, FloatArray] = {}
+    for drive, sensitivity, way, white in drives:
+        middles = (0.5 * (drive.times[1:] + drive.times[:-1]) - drive.start) / GRID
+        parts = np.repeat(np.floor(way[np.clip(middles.astype(int), 0, len(way) - 1)] / part), 3).astype(int)
+        tones = zip(*(_waves(way, times * waves) for times in range(1, overtones + 1)), strict=True)
+        at = 0
+        for some in tones:
+            here = slice(at, at + some[0].shape[1] // 2)
+            at = here.stop
+            # (rows, waves, cosines and sines of all tones)
+            whole = [
+                problem.whitened(drive, sensitivity.increments(channel, tone)).reshape(len(white), -1, 2)
+                for tone in some
+            ]
+            both = whole[0] if overtones == 1 else np.concatenate(whole, axis=2)
+            for key in np.unique(parts).tolist():
+                own, left = both[parts == key], white[parts == key]
+                gram = grams.setdefault(key, np.zeros((len(waves), size, size)))
+                gram[here] += np.einsum("nki,nkj->kij", own, own)
+                pulls.setdefault(key, np.zeros((len(waves), size)))[here] += np.einsum("nki,n->ki", own, left)
+    out = np.zeros(len(waves))
+    for key, pull in pulls.items():
+        along = np.linalg.solve(grams[key] + 1e-9 * np.eye(size), pull[..., None])[..., 0]
+        out += np.einsum("ki,ki->k", pull, along)
+    return out
 
 
 def _waves(way: FloatArray, waves: FloatArray) -> Iterator[FloatArray]:

@@ -12,8 +12,9 @@ from kurumaisu.critic.base import replay
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.catalogue import settings_of
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.unknown.bases import Basis, root_of
+from kurumaisu.critic.unknown.bases import root_of
 from kurumaisu.critic.unknown.curves import Curve, columns, raw_columns
+from kurumaisu.critic.unknown.shapes import DrawnCurve
 from kurumaisu.params import EffectSetting
 from kurumaisu.types import FloatArray
 
@@ -37,9 +38,9 @@ class FitWithCurve:
     covariance: FloatArray
 
     @property
-    def basis(self) -> Basis:
-        """Return the basis of the curve."""
-        return self.curve.basis
+    def drawn(self) -> DrawnCurve:
+        """Return the curve alone."""
+        return DrawnCurve(self.curve.basis, self.coefficients, self.covariance)
 
     @property
     def unknown(self) -> EffectSetting:

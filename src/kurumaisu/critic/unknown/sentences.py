@@ -8,7 +8,7 @@ import numpy as np
 from kurumaisu import effects
 from kurumaisu.critic.unknown.curves import Curve
 from kurumaisu.critic.unknown.joint_fit import FitWithCurve
-from kurumaisu.critic.unknown.shapes import Shape, grid, shape_of
+from kurumaisu.critic.unknown.shapes import DrawnCurve, Shape, grid, shape_of
 
 # How a reader calls them, and their units.
 CHANNEL_NAMES = {
@@ -75,15 +75,20 @@ def unit_of(channel: str) -> str:
 
 def shape(extension: FitWithCurve, *, intervals: bool = True) -> str:
     """Return the curve's shape with place and size, each with its unit and, if asked for, its 90 % interval."""
-    found = shape_of(extension)
     unit, rate = covariate(extension.curve)[2], unit_of(extension.curve.channel)
-    size = _quantity(found, "size", rate, intervals)
+    return shape_over(extension.drawn, unit, rate, intervals=intervals)
+
+
+def shape_over(curve: DrawnCurve, unit: str, of: str, *, intervals: bool = True) -> str:
+    """Return the same of any curve; units: of its covariate, and of itself."""
+    found = shape_of(curve)
+    size = _quantity(found, "size", of, intervals)
     if found.kind == "periodic":
-        times = round(extension.curve.basis.constants["period"] / found.place[0])
-        turn = extension.curve.basis.covariate == "heading"
+        times = round(curve.basis.constants["period"] / found.place[0])
+        turn = np.isclose(curve.basis.constants["period"], 2 * np.pi) and unit == "rad"
         period = f"2 pi{f'/{times}' if times > 1 else ''}" if turn else f"{found.place[0]:.3g} {unit}"
         return f"periodic, period {period}, amplitude {size}"
-    at = grid(extension)
+    at = grid(curve)
     span = f"from {at[0]:.3g} to {at[-1]:.3g} {unit}".rstrip()
     if found.kind == "line":
         return f"monotone, {'rises' if found.size[0] > 0 else 'falls'} by {size} {span}"

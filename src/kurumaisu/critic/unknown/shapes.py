@@ -6,11 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 
-from kurumaisu.critic.unknown.bases import Basis, Offset
+from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.step_curves import StepCurve
 from kurumaisu.types import FloatArray
 
@@ -20,15 +19,13 @@ _PLACES = 25  # of a template along the covariate
 _TURN = 2 * np.pi
 
 
-class _Described(Protocol):
-    """A curve over a covariate: basis, coefficients (m,) and their covariance (m, m)."""
+@dataclass(frozen=True)
+class DrawnCurve:
+    """A curve over a covariate: its coefficients (m,) and their covariance (m, m)."""
 
-    @property
-    def basis(self) -> Basis: ...
-    @property
-    def coefficients(self) -> FloatArray: ...
-    @property
-    def covariance(self) -> FloatArray: ...
+    basis: Basis
+    coefficients: FloatArray
+    covariance: FloatArray
 
 
 @dataclass(frozen=True)
@@ -60,10 +57,10 @@ TEMPLATES: dict[str, tuple[Callable[[FloatArray, float], FloatArray], ...]] = {
 }
 
 
-def grid(described: _Described) -> FloatArray:
+def grid(curve: DrawnCurve) -> FloatArray:
     """Return values of the covariate at which its curve is known."""
-    basis = described.basis
-    if isinstance(basis, Offset):
+    basis = curve.basis
+    if len(basis.knots) == 1:
         return np.array([basis.low, basis.high])
     if isinstance(basis, StepCurve):
         return np.sort(np.append(np.linspace(basis.low, basis.high, _POINTS), basis.knots))
@@ -73,32 +70,32 @@ def grid(described: _Described) -> FloatArray:
     return np.linspace(0.0, basis.constants["period"], _POINTS, endpoint=False)
 
 
-def band(described: _Described, at: FloatArray) -> FloatArray:
+def band(curve: DrawnCurve, at: FloatArray) -> FloatArray:
     """Return the curve and its standard deviation at values of the covariate, (2, n)."""
-    matrix = described.basis.matrix(at)
-    variance = np.einsum("ij,jk,ik->i", matrix, described.covariance, matrix)
-    return np.stack([matrix @ described.coefficients, np.sqrt(np.maximum(variance, 0.0))])
+    matrix = curve.basis.matrix(at)
+    variance = np.einsum("ij,jk,ik->i", matrix, curve.covariance, matrix)
+    return np.stack([matrix @ curve.coefficients, np.sqrt(np.maximum(variance, 0.0))])
 
 
-def shape_of(described: _Described) -> Shape:
+def shape_of(curve: DrawnCurve) -> Shape:
     """Return the template that describes the curve best, with intervals from draws of its coefficients."""
-    at = grid(described)
-    mean, rng = described.coefficients, np.random.default_rng(0)
-    drawn = rng.multivariate_normal(mean, described.covariance, size=_DRAWS, check_valid="ignore")
+    at = grid(curve)
+    mean, rng = curve.coefficients, np.random.default_rng(0)
+    drawn = rng.multivariate_normal(mean, curve.covariance, size=_DRAWS, check_valid="ignore")
     every = np.vstack([mean, drawn])
-    curves = every @ described.basis.matrix(at).T
-    if isinstance(described.basis, Offset):
+    curves = every @ curve.basis.matrix(at).T
+    if len(curve.basis.knots) == 1:
         return Shape("constant", np.full(3, (at[0] + at[-1]) / 2), _interval(curves[:, 0]))
-    if not len(described.basis.knots):
-        return _periodic(described, every)
-    if isinstance(described.basis, StepCurve):
-        return Shape("jump", described.basis.place, _interval(np.diff(every)[:, 0]))
+    if not len(curve.basis.knots):
+        return _periodic(curve, every)
+    if isinstance(curve.basis, StepCurve):
+        return Shape("jump", curve.basis.place, _interval(np.diff(every)[:, 0]))
     x = (at - at[0]) / (at[-1] - at[0])
     noise = float(np.mean(curves[1:].var(axis=0)))
     # Each of a kind's places is a parameter more than a line has.
     costs = {k: np.log(_best(k, x, curves[0])[2] + noise) * 8 + (k != "line") * np.log(8) for k in TEMPLATES}
     kind = min(costs, key=lambda name: costs[name])
-    fitted = [_best(kind, x, curve) for curve in curves]
+    fitted = [_best(kind, x, one) for one in curves]
     sizes = np.array([size for _, size, _ in fitted])
     if kind == "line" and np.diff(np.sign(_interval(sizes)[1:])):  # neither rises nor falls: none of the templates
         kind, sizes = "irregular", np.ptp(curves, axis=1)
@@ -106,12 +103,12 @@ def shape_of(described: _Described) -> Shape:
     return Shape(kind, at[0] + (at[-1] - at[0]) * _interval(places), _interval(sizes))
 
 
-def _periodic(described: _Described, coefficients: FloatArray) -> Shape:
+def _periodic(curve: DrawnCurve, coefficients: FloatArray) -> Shape:
     """Return the strongest harmonic."""
     count = (coefficients.shape[1] - 1) // 2
     sizes = np.hypot(coefficients[:, 1 : 1 + count], coefficients[:, 1 + count :])
     strongest = int(np.argmax(sizes[0]))
-    period = described.basis.constants["period"] / (strongest + 1)
+    period = curve.basis.constants["period"] / (strongest + 1)
     return Shape("periodic", np.full(3, period), _interval(sizes[:, strongest]))
 
 

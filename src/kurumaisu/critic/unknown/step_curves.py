@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 
 from kurumaisu.critic.base import replay
 from kurumaisu.critic.engine.evidence import Fit, Problem
-from kurumaisu.critic.unknown.bases import FINER, Basis
+from kurumaisu.critic.unknown.bases import Basis
 from kurumaisu.critic.unknown.curves import Curve, CurveEvidence, columns, curve_evidence, curve_evidences
 from kurumaisu.types import FloatArray
 
@@ -32,17 +32,10 @@ _PRIORS = (np.diag([0.0, 1.0]), np.diag([1.0, 0.0]), np.eye(2))
 class StepCurve(Basis):
     """Two levels with a jump between them; the knots are its two sides.
 
-    place: of the jump, with its 90 % interval, (3,); hats: knots of the curve over the same that does not jump.
+    place: of the jump, with its 90 % interval, (3,).
     """
 
     place: FloatArray = field(kw_only=True)
-    hats: FloatArray = field(kw_only=True)
-
-    def finer(self, times: int = FINER) -> Basis:
-        """Return the curves over the same with more knots, which hold these."""
-        smooth = Basis(self.covariate, self.hats, self.constants, (), self.low, self.high).finer(times)
-        apart = np.abs(smooth.knots[:, None] - self.knots).min(axis=1) > np.ptp(self.knots)
-        return replace(smooth, knots=np.sort(np.append(smooth.knots[apart], self.knots)))
 
 
 @dataclass(frozen=True)
@@ -109,7 +102,6 @@ class _StepPlaces:
             basis.low,
             basis.high,
             place=np.array([place, min(low, place), max(high, place)]),
-            hats=basis.knots,
         )
         return replace(self.curve, basis=jump, columns=slice(0, 2)), CurveEvidence(total, self.priors[level])
 
@@ -150,7 +142,7 @@ def _first(problem: Problem, fit: Fit, curves: Sequence[Curve]) -> Iterator[_Ste
     motions = [replay.motion(drive, problem.model, fit.settings) for drive in problem.drives]
     moving = [motion.moving for motion in motions]
     for curve in curves:
-        if not len(curve.basis.knots):
+        if len(curve.basis.knots) < 2:
             continue
         values = np.concatenate([curve.basis.samples(m)[moved] for m, moved in zip(motions, moving, strict=True)])
         finite = values[np.isfinite(values)]  # none where beside these effects the chair never rests, say
