@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: BSD-3-Clause
-"""Rows of a reference that are elsewhere for a while: jumps away, paired with those that come back."""
+"""Rows of a reference that are elsewhere for a while: between a jump away and one back, a gap, or an end."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,69 +18,42 @@ NEAR = 2  # rows
 _GAP = 5.0  # usual intervals
 
 Spans = list[tuple[int, int, float]]  # first row, end and distance [m] of each stretch that is off
+_Way = tuple[int, int, Spans]  # jumps left, rows set aside, and which
 
 
 def displaced_rows(pose: Series, command: Series | None) -> Spans:
-    """Return what is off, however it jumps about meanwhile: what leaves fewest jumps, and then most rows.
-
-    A jump may end what lasts for longer, or be what a single row does.
-    """
+    """Return what is off, however it jumps about meanwhile: what leaves fewest jumps, and then most rows."""
     lasting, single = jumps(pose, 1.0, command)
-    jumped = sorted({*lasting, *single})
-    step = _beyond_motion(pose, jumped)
-    alone = [(row, row + 1, float(np.hypot(*step[row - 1]))) for row in _singles(pose, jumped)]
-    ways = []
-    known: Spans
-    for known in ([], alone) if alone else ([],):
-        rest = [i for i in jumped if i not in _ends(known)]
-        found = [*known, *_returns(pose, rest, set(single), step)]
-        found += _next_to_gaps(pose, [i for i in jumped if i not in _ends(found)])
-        left = len(set(jumped) - _ends(found))
-        ways.append((left, sum(end - first for first, end, _ in found), sorted(found)))
-    return min(ways)[2]
-
-
-def _ends(spans: Spans) -> set[int]:
-    return {row for first, end, _ in spans for row in (first, end)}
-
-
-def _singles(pose: Series, jumped: Sequence[int]) -> list[int]:
-    """Return the rows that jump away alone, and back with the next."""
-    out: list[int] = []
-    for i in jumped:
-        if i + 1 in jumped and i - 1 not in out and _alone(pose, i):
-            out.append(i)
-    return out
-
-
-def _returns(pose: Series, jumped: Sequence[int], single: set[int], step: FloatArray) -> Spans:
-    """Return the stretches from a jump to the one that brings it back; step (n - 1, 2) [m]: beyond the motion."""
-    found: Spans = []
-    away, last = 0, 0  # rows at which it left, and jumped last
-    off, far = np.zeros(2), 0.0  # how far it is off, and was at most
-    for i in jumped:
-        if away in single and last == away and i > away + 1 and _alone(pose, away):
-            found.append((away, away + 1, far))  # its way back was no jump
-            away = 0
-        if not away or pose.t[i] - pose.t[away] >= _BACK:
-            away, off, far = i, np.zeros(2), 0.0
-        off, last = off + step[i - 1], i
-        far = max(far, float(np.hypot(*off)))
-        if np.hypot(*off) < _SAME * np.hypot(*step[away - 1]):
-            found.append((away, i, far))
-            away = 0
-    if away in single and last == away and away + 1 < len(pose.t) and _alone(pose, away):
-        found.append((away, away + 1, far))
-    return found
-
-
-def _next_to_gaps(pose: Series, jumped: Sequence[int]) -> Iterator[tuple[int, int, float]]:
-    """Yield the same of the few rows between a jump and a gap, or an end: where it came from, or went to, is hidden."""
+    jumped = {*lasting, *single}
+    if not jumped:
+        return []
     lasts = np.diff(pose.t)
-    gaps = [0, *(np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist(), len(pose.t)]
-    for i in jumped:
-        far = float(np.hypot(*(pose.values[i, :2] - pose.values[i - 1, :2])))
-        yield from ((min(i, gap), max(i, gap), far) for gap in gaps if 0 < abs(gap - i) <= NEAR)
+    hidden = {0, *(np.flatnonzero(lasts > _GAP * np.median(lasts)) + 1).tolist(), len(pose.t)}
+    turns = jumped | {row + 1 for row in single}  # a single row is back with the next, be it by a jump or not
+    step = _beyond_motion(pose, sorted(jumped))
+
+    def off(first: int, end: int) -> float | None:
+        """Return how far [m] rows are off; None where they are not, or nobody knows."""
+        if end - first <= NEAR and ({first, end} & jumped) and ({first, end} & hidden):
+            return float(np.hypot(*step[(first if first in jumped else end) - 1]))
+        if first not in jumped or end not in turns or end == len(pose.t) or pose.t[end] - pose.t[first] >= _BACK:
+            return None
+        away = np.hypot(*np.cumsum([step[row - 1] for row in range(first, end + 1) if row in turns], axis=0).T)
+        back = away < _SAME * away[0]
+        return float(away.max()) if back[-1] and not back[:-1].any() else None
+
+    cuts = sorted(turns | hidden)
+    kept: dict[int, _Way] = {0: (0, 0, [])}  # the best way to each cut, up to which rows are kept,
+    aside: dict[int, _Way] = {}  # and up to which they are set aside
+    for before, end in pairwise(cuts):
+        left, rows, spans = kept[before]
+        kept[end] = min((left + (before in jumped), rows, spans), aside.get(before, (len(cuts), 0, [])))
+        for first in (cut for cut in cuts if cut < end and pose.t[end - 1] - pose.t[cut] < _BACK):
+            if (far := off(first, end)) is not None:
+                left, rows, spans = kept[first]
+                way = (left, rows + end - first, [*spans, (first, end, far)])
+                aside[end] = min(way, aside.get(end, way))
+    return min(kept[len(pose.t)], aside.get(len(pose.t), kept[len(pose.t)]))[2]
 
 
 def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
@@ -90,9 +64,3 @@ def _beyond_motion(pose: Series, jumped: Sequence[int]) -> FloatArray:
         return step
     rates = (step / lasts)[quiet - 1]
     return np.asarray(step - lasts * np.column_stack([np.interp(pose.t[1:], pose.t[quiet], one) for one in rates.T]))
-
-
-def _alone(pose: Series, row: int) -> bool:
-    """Tell whether the row after one that jumped is back where it jumped from."""
-    jump, left = pose.values[row : row + 2, :2] - pose.values[row - 1, :2]
-    return bool(np.hypot(*left) < _SAME * np.hypot(*jump))
