@@ -65,7 +65,7 @@ class Decision:
         if extension is not None:
             curved = joint_fit.refitted(extension, drives, self.problem)
             return drive_gain.FittedExtension(
-                curved.settings, lambda drive: joint_fit.doubt(self.problem, drive, curved)
+                curved.settings, doubt(self.problem, curved.settings, about_curve(curved))
             )
         other = self.problem.changed(drives=drives)
         fit = other.fit_candidates(best.candidates, best.start)

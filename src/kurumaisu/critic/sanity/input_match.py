@@ -8,6 +8,7 @@ What separates wrong data from an effect is size. Gains within a factor of five 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,14 +53,20 @@ _UNITS_W = {
 
 @dataclass(frozen=True)
 class Match:
-    """How the motion follows the input, after the best shift: lag [s]; swapped; per channel correlation and factor."""
+    """How the motion follows the input, after the best shift: lag [s]; per channel correlation and factor (2,)."""
 
     lag: float
-    swapped: bool
     correlation: FloatArray
     factor: FloatArray
-    offset: FloatArray
     words: tuple[str, ...]
+
+
+class Line(NamedTuple):
+    """One thing = offset + factor * another, and the correlation of both; 0 where too little of them is known."""
+
+    correlation: float
+    factor: float
+    offset: float
 
 
 def compare(asked: Rates, driven: Rates, name: str, *, longest: float = _PIECES, first: bool = False) -> Match:
@@ -91,8 +98,10 @@ def compare(asked: Rates, driven: Rates, name: str, *, longest: float = _PIECES,
         words += _scale_words(asked, driven, name, max(float(total[at]), float(crossed[best]), float(straight[best])))
     if swapped:
         words.append(_swap_words(name, pairs, at))
-    match = _lines(asked, driven, float(lags[at]), swapped)
-    return Match(*match, words=tuple(words))
+    x = shifted(asked.values[:, ::-1] if swapped else asked.values, round(float(lags[at]) / STEP))
+    lines = [line(x[:, i], driven.values[:, i], _LEAST[i]) for i in range(2)]
+    correlation, factor = (np.array(each) for each in zip(*(one[:2] for one in lines), strict=True))
+    return Match(float(lags[at]), correlation, factor, tuple(words))
 
 
 def _beginning(asked: Rates, driven: Rates, longest: float) -> tuple[Rates, Rates]:
@@ -174,21 +183,13 @@ def _scale_words(asked: Rates, driven: Rates, name: str, base: float) -> list[st
     ]
 
 
-def _lines(
-    asked: Rates, driven: Rates, lag: float, swapped: bool
-) -> tuple[float, bool, FloatArray, FloatArray, FloatArray]:
-    """Return lag, swapped and the lines of driven over asked, per channel: correlation, factor, offset."""
-    shift = round(lag / STEP)
-    x = shifted(asked.values[:, ::-1] if swapped else asked.values, shift)
-    correlation, factor, offset = np.zeros(2), np.full(2, np.nan), np.zeros(2)
-    for i in range(2):
-        good = np.isfinite(x[:, i]) & np.isfinite(driven.values[:, i])
-        a, b = x[good, i], driven.values[good, i]
-        if len(a) < 3 * SPAN / STEP or a.std() < _LEAST[i] or b.std() == 0:
-            continue
-        correlation[i] = np.corrcoef(a, b)[0, 1]
-        factor[i], offset[i] = np.polyfit(a, b, 1)
-    return lag, swapped, correlation, factor, offset
+def line(x: FloatArray, y: FloatArray, least: float) -> Line:
+    """Return the line of y (n,) over x (n,), which says nothing if its sd is below the least."""
+    known = np.isfinite(x) & np.isfinite(y)
+    a, b = x[known], y[known]
+    if len(a) < 3 * SPAN / STEP or a.std() < least or b.std() == 0:
+        return Line(0.0, np.nan, 0.0)
+    return Line(float(np.corrcoef(a, b)[0, 1]), *map(float, np.polyfit(a, b, 1)))
 
 
 def shifted(rows: FloatArray, by: int) -> FloatArray:

@@ -7,7 +7,6 @@ A chair with another voltage law than the model's turns by other rates: what no 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from kurumaisu.critic.base.drive import GRID, LONGEST, prepare
 from kurumaisu.critic.rates import mean_rates
 from kurumaisu.critic.rates.mean_rates import STEP, Rates, of_input
 from kurumaisu.critic.sanity import input_match
-from kurumaisu.critic.sanity.input_match import Match, shifted
+from kurumaisu.critic.sanity.input_match import Line, Match, line, shifted
 from kurumaisu.critic.values.digits import moment
 from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.params import EffectSetting, Model
@@ -25,6 +24,7 @@ from kurumaisu.types import FloatArray
 
 _MOST = 30.0  # [V] no joystick input of a wheelchair takes more
 _LAGS = np.arange(0.0, 1.6, 0.1)  # [s]
+_CHANGES = 0.02  # [V] sd of an expected voltage below which it says nothing
 _ALIKE = 0.6  # least correlation of the voltage with the one expected
 _FOLLOWS = 0.5  # correlation of the rates with those that the voltages ask for, from which no sign is wrong
 _NAMES = ("v_f", "v_s")
@@ -36,15 +36,6 @@ _NEAR = 0.35  # relative distance of two spans that are the same drive
 _MOVED = 0.05  # [m] driven at least, where way asked for and way driven are compared
 _SPARSE = 10.0  # [s] for each row, on the mean: nothing is recorded as rarely
 _ENDLESS = 1e7  # [s] a quarter of a year
-
-
-@dataclass(frozen=True)
-class _Line:
-    """Voltage given = offset + factor * voltage expected, and the correlation of both."""
-
-    offset: float
-    factor: float
-    correlation: float
 
 
 def problems(voltage: Series, driven: Rates, model: Model, follows: FloatArray) -> list[str]:
@@ -61,49 +52,42 @@ def problems(voltage: Series, driven: Rates, model: Model, follows: FloatArray) 
         expected = np.where(
             np.isfinite(driven.values[:, i]), law.volts(np.where(abs(rates) < 0.02, 0.0, rates)), np.nan
         )
-        line = _line(given.values[:, i], expected)
-        found = _wrong(_NAMES[i], voltage.values[:, i], line, model.reference_voltage, bool(follows[i] > _FOLLOWS))
+        fitted = _line(given.values[:, i], expected)
+        found = _wrong(_NAMES[i], voltage.values[:, i], fitted, model.reference_voltage, bool(follows[i] > _FOLLOWS))
         if found is not None:
             told.append(found)
     return told
 
 
-def _line(given: FloatArray, expected: FloatArray) -> _Line:
-    """Return the line at the lag at which both are most alike."""
-    best = _Line(float(np.nanmedian(given)), float("nan"), 0.0)
-    for lag in _LAGS:
-        early = shifted(given[:, None], round(lag / STEP))[:, 0]
-        good = np.isfinite(early) & np.isfinite(expected)
-        a, b = expected[good], early[good]
-        if len(a) < 50 or a.std() < 0.02 or b.std() == 0:
-            continue
-        alike = float(np.corrcoef(a, b)[0, 1])
-        if abs(alike) > abs(best.correlation):
-            factor, offset = np.polyfit(a, b, 1)
-            best = _Line(float(offset), float(factor), alike)
-    return best
+def _line(given: FloatArray, expected: FloatArray) -> Line:
+    """Return the line of the voltage given over the one expected, at the lag at which both are most alike."""
+    lines = [line(expected, shifted(given[:, None], round(lag / STEP))[:, 0], _CHANGES) for lag in _LAGS]
+    best = max(lines, key=lambda one: abs(one.correlation))
+    return best if best.correlation else Line(0.0, np.nan, float(np.nanmedian(given)))
 
 
-def _wrong(name: str, raw: FloatArray, line: _Line, reference: float, follows: bool) -> str | None:
+def _wrong(name: str, raw: FloatArray, fitted: Line, reference: float, follows: bool) -> str | None:
     largest = float(np.abs(raw).max())
-    known = abs(line.correlation) > _ALIKE
+    known = abs(fitted.correlation) > _ALIKE
     measured = (
-        f"{abs(line.factor):.4g} per volt expected, {line.offset:.4g} at 0 V" if known else f"up to {largest:.4g}"
+        f"{abs(fitted.factor):.4g} per volt expected, {fitted.offset:.4g} at 0 V" if known else f"up to {largest:.4g}"
     )
     if largest > _MOST:
-        millivolts = known and abs(np.log(abs(line.factor) / 1000)) < 0.4
+        millivolts = known and abs(np.log(abs(fitted.factor) / 1000)) < 0.4
         whole = bool((raw == np.round(raw)).all())
-        if whole and not (millivolts and abs(line.offset) < 300):
+        if whole and not (millivolts and abs(fitted.offset) < 300):
             return f"{name} looks like D/A counts: whole numbers, {measured}; try (counts - zero) / counts per volt"
-        if abs(line.offset) < 300 or not known:
+        if abs(fitted.offset) < 300 or not known:
             return f"{name} looks like mV, not V: {measured}; try {name} / 1000"
-        return f"{name} looks like mV, reference voltage included: {measured}; try ({name} - {line.offset:.0f}) / 1000"
-    if line.correlation < -_ALIKE and not follows:
-        alike = f"correlation {line.correlation:.2f} with the expected voltage"
+        return (
+            f"{name} looks like mV, reference voltage included: {measured}; try ({name} - {fitted.offset:.0f}) / 1000"
+        )
+    if fitted.correlation < -_ALIKE and not follows:
+        alike = f"correlation {fitted.correlation:.2f} with the expected voltage"
         return (
             f"{name} has the wrong sign ({'forward speed' if name == _NAMES[0] else 'yaw rate'}): {alike}; try -{name}"
         )
-    middle = line.offset if known else float(np.median(raw))
+    middle = fitted.offset if known else float(np.median(raw))
     if abs(middle) > 0.5 * reference and abs(middle) > 0.8:
         return (
             f"{name} seems to include the reference voltage: it is {middle:.3g} V where 0 V is expected (the model's "
@@ -140,7 +124,7 @@ def untimely(run: Run) -> list[str]:
     """Return what is wrong with the units of the times, in words; empty when they can be seconds."""
     there = {name: part for name, part in run.parts(*_PARTS).items() if len(part.t) > 10}
     told = [_too_slow(run, name, part) for name, part in there.items()]
-    found = [line for line in told if line is not None]
+    found = [words for words in told if words is not None]
     return found or _spans_apart(there)
 
 

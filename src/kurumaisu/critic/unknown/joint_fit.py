@@ -109,12 +109,6 @@ def simulated_columns(problem: Problem, drive: Drive, extension: FitWithCurve) -
     return np.hstack([known, raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])])
 
 
-def doubt(problem: Problem, drive: Drive, extension: FitWithCurve) -> FloatArray:
-    """Return how a drive's increments change by errors of the curve, normal with sd 1 each, (3 m, k)."""
-    own = raw_columns(drive, problem.model, extension.fit.settings, [extension.curve])
-    return np.asarray(own @ root_of(extension.covariance))
-
-
 def _step(problem: Problem, extension: FitWithCurve, root: FloatArray) -> FitWithCurve:
     fit = extension.fit
     beside = problem.changed(model=replay.extend(problem.model, [extension.unknown]))

@@ -16,7 +16,6 @@ from kurumaisu.types import FloatArray
 _POINTS = 60  # at which a curve is described
 _DRAWS = 300  # of the posterior
 _PLACES = 25  # of a template along the covariate
-_TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
