@@ -184,7 +184,8 @@ def stands(run: Run, at: FloatArray) -> BoolArray:
 
 def _asked(command: Series, at: FloatArray) -> FloatArray:
     """Return the mean |v| + |w| asked for about times (n,), each command held until the next, (n,)."""
-    return of_input(command.t, np.abs(np.column_stack([command.column(name) for name in "vw"])), at).values.sum(axis=1)
+    rates = np.abs(np.column_stack([command.column(name) for name in "vw"]))
+    return np.asarray(of_input(command.t, rates, at).values.sum(axis=1))
 
 
 def with_yaw_rate(run: Run, axis: str | None = None) -> tuple[Run, list[str]]:
