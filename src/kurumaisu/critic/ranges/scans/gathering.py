@@ -21,7 +21,7 @@ from kurumaisu.robust import SIGMA_PER_MAD
 from kurumaisu.types import BoolArray, FloatArray, IntArray
 from kurumaisu.world import load_world
 
-MOST_SCANS = 250  # that are criticised, evenly taken from all: 170 000 readings
+MOST_SCANS = 150  # that are criticised, evenly taken from all: 100 000 readings
 _FAN, _MORE = 682, 2.0  # beams of such a scan; of scans of fewer beams there may be more, at most so many times
 _FEWEST_SCANS = 5
 _DAY = 86400.0  # [s] a first stamp beyond this is a date, not a time since the laser was switched on
