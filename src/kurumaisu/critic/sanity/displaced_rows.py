@@ -45,10 +45,13 @@ def displaced_rows(pose: Series, command: Series | None) -> Spans:
     cuts = sorted(turns | hidden)
     kept: dict[int, _Way] = {0: (0, 0, [])}  # the best way to each cut, up to which rows are kept,
     aside: dict[int, _Way] = {}  # and up to which they are set aside
-    for before, end in pairwise(cuts):
+    near = 0
+    for k, (before, end) in enumerate(pairwise(cuts)):
         left, rows, spans = kept[before]
         kept[end] = min((left + (before in jumped), rows, spans), aside.get(before, (len(cuts), 0, [])))
-        for first in (cut for cut in cuts if cut < end and pose.t[end - 1] - pose.t[cut] < _BACK):
+        while near <= k and pose.t[end - 1] - pose.t[cuts[near]] >= _BACK:
+            near += 1
+        for first in cuts[near : k + 1]:
             if (far := off(first, end)) is not None:
                 left, rows, spans = kept[first]
                 way = (left, rows + end - first, [*spans, (first, end, far)])
