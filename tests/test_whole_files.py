@@ -42,12 +42,9 @@ EXCEPTIONS = {
     "bench/slam/ours.py": {"savez": "scratch, handed to a process of our own"},
     "bench/peers.py": {"tofile": "scratch, handed to a peer's program"},
     "bench/strangers/fell/files.py": {"write_text": MADE},
-    "bench/strangers/holm/record.py": {"write_text": MADE},
     "bench/strangers/knoll/files.py": {"write_text": MADE},
+    "bench/strangers/marl/writing.py": {"write_text": MADE},
     "bench/strangers/quay/writing.py": {"write_text": MADE},
-    "bench/strangers/tarn/base.py": {"savetxt": MADE},
-    "bench/strangers/tarn/laser.py": {"write_bytes": MADE, "write_text": MADE},
-    "bench/strangers/tarn/make.py": {"write_text": MADE},
 }
 
 
