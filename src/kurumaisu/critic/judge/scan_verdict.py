@@ -129,7 +129,7 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
         return
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     if recording.truth is not None:
-        beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms)
+        beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms, fit.block)
         # What equations nearly right leave of what acts looks like a reference that wanders, too.
         if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
             progress("laser: the reference errs by more than is said")

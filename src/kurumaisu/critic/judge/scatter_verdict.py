@@ -67,7 +67,7 @@ def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | N
     found = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
     if made.curve:
         return found
-    seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, own)
+    seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, fit.block, own)
     scatter = with_common_offset(found.effects, seen, fit.normal.scan_noise, recording, ids)
     scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)
     return replace(found, effects=scatter)

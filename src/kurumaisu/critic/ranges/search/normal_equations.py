@@ -248,22 +248,42 @@ class Assembly:
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
     def common_mode(
-        self, normal: NormalEquations, truth: tuple[float, float] | None, fitted: Sequence[Form], own_sd: float = 0.0
+        self,
+        normal: NormalEquations,
+        truth: tuple[float, float] | None,
+        fitted: Sequence[Form],
+        block: FloatArray,
+        own_sd: float = 0.0,
     ) -> CommonMode:
         """Return what says that whole scans are off together, whatever effects on the mean there are.
 
-        fitted: forms that act, with their shapes; own_sd [m]: of whole scans in the model.
+        fitted: forms that act, with their shapes; block (k, b, m): columns that act besides; own_sd [m]: of whole scans
+        in the model.
         """
-        project = self._projected(fitted)
-        grams = self.grams(normal.beam_noise, project, lasting=True)
-        seen = common_mode(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise, own_sd)
+        grams, every = self._without(normal, fitted, block)
+        seen = common_mode(grams, self.layout, truth, every, normal.scan_noise, own_sd)
         return replace(seen, wary=normal.wary)
 
-    def beyond_stated(self, normal: NormalEquations, truth: tuple[float, float], fitted: Sequence[Form]) -> float:
-        """Return what says [nat] that the reference errs by more than is said; fitted: forms that act."""
-        project = self._projected(fitted)
-        grams = self.grams(normal.beam_noise, project, lasting=True)
-        return beyond_stated(grams, self.layout, truth, np.arange(len(project)), normal.scan_noise)
+    def beyond_stated(
+        self, normal: NormalEquations, truth: tuple[float, float], fitted: Sequence[Form], block: FloatArray
+    ) -> float:
+        """Return what says [nat] that the reference errs by more than is said; fitted, block: as of common_mode."""
+        grams, every = self._without(normal, fitted, block)
+        return beyond_stated(grams, self.layout, truth, every, normal.scan_noise)
+
+    def settled_beside(
+        self, normal: NormalEquations, truth: tuple[float, float] | None, fitted: Sequence[Form], block: FloatArray
+    ) -> NormalEquations:
+        """Return the noise of scans with a block of columns (k, b, m) that acts: what it does is none."""
+        grams, every = self._without(normal, fitted, block)
+        scan = estimate(grams, self.layout, truth, every)
+        return replace(normal, scan_noise=scan, wary=with_lasting_common_mode(grams, self.layout, every, scan))
+
+    def _without(self, normal: NormalEquations, fitted: Sequence[Form], block: FloatArray) -> tuple[Grams, IntArray]:
+        """Return the grams that noise is told by, and which of their columns it is none of: all."""
+        other = copy(self)
+        other.columns = np.concatenate([self.columns[:, :, self._projected(fitted)], block], axis=2, dtype=np.float32)
+        return other.grams(normal.beam_noise, lasting=True), np.arange(other.columns.shape[2])
 
     def full(self, normal: NormalEquations) -> NormalEquations:
         """Return the normal equations of all columns, in the noise that is known."""

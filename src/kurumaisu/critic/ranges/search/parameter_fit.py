@@ -50,7 +50,8 @@ class ParameterFit:
     """Settings of what acts on the mean, with the sds of what was fitted; where that was, and what it leaves.
 
     assembly: the scans as they are seen with these effects, where any of them moves beams; normal: the noise there, as
-    far as it was estimated anew; left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are
+    far as it was estimated anew; block (k, b, m) [m]: what acts besides, per prior sd of each of its coefficients;
+    left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are
     only nearly right may have wrong in it, 1 sd; slopes (k, b, p) [m]: how the mean follows what was fitted, per prior
     sd of each.
     """
@@ -58,6 +59,7 @@ class ParameterFit:
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
     assembly: Assembly
     normal: NormalEquations
+    block: FloatArray
     left: FloatArray
     missed: FloatArray
     slopes: FloatArray
@@ -79,12 +81,13 @@ def fit_parameters(
     """
     if not forms and winner is None:
         none = np.empty((*assembly.residual.shape, 0))
-        return ParameterFit((), assembly, normal, assembly.residual, none, none)
+        return ParameterFit((), assembly, normal, none, assembly.residual, none, none)
     at = [dict(setting.parameters) for setting in settings]
     curves = [others[form.id] for form in forms if form.id in others]
     block = np.empty((*assembly.residual.shape, 0))  # in units in which its coefficients have a prior sd of 1
     if winner is not None:
         block = np.asarray(assembly.columns[:, :, winner.free.span] @ root_of(winner.evidence.prior))
+        normal = assembly.settled_beside(normal, truth, forms, block)
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
     moving = strength(assembly, normal, assembly.marks.together(_settings(forms, at))) > STRONG or any(
         not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
@@ -124,7 +127,8 @@ def fit_parameters(
     ways = np.empty((*left.shape, 0))
     if free:
         ways = np.stack([slope * each.prior for slope, each in zip(slopes, free, strict=True)], axis=-1)
-    return ParameterFit(tuple(zip(_settings(forms, at), out, strict=True)), assembly, normal, left, missed, ways)
+    told = tuple(zip(_settings(forms, at), out, strict=True))
+    return ParameterFit(told, assembly, normal, block, left, missed, ways)
 
 
 def _signals(
