@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 
+import laser_scene
 import numpy as np
 import pytest
 from laser_scene import recording, sparse
@@ -42,3 +43,16 @@ def test_a_reference_that_wanders_is_no_mounting(tmp_path, seed):
     data = wandering(sparse(recording(tmp_path, None, 0.0, seed, scans=150)), 0.6, 4.0, seed)
     finding = criticise_scans(data, MODEL, lambda _: None)
     assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())
+
+
+def test_walls_that_are_off_are_neither_a_common_mode_nor_the_references_errors(tmp_path, monkeypatch):
+    drawn, rng = laser_scene.BOXES, np.random.default_rng(5)
+    there = tuple((name, *(np.array([x, y]) + 0.01 * rng.standard_normal(2)), *more) for name, x, y, *more in drawn)
+    monkeypatch.setattr(laser_scene, "BOXES", there)
+    data = recording(tmp_path, None, 0.0, 5, scans=100)
+    monkeypatch.setattr(laser_scene, "BOXES", drawn)
+    laser_scene.write_world(data.world)
+    finding = criticise_scans(data, MODEL, lambda _: None, frozenset({"world.map_error", "laser.common_mode"}))
+    assert [cause.id for cause in finding.causes] == ["world.map_error"]
+    (common,) = (one for one in finding.pictures.noise if one.name == "laser: error common to a whole scan")
+    assert common.estimate < 0.002

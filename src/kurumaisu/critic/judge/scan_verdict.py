@@ -204,8 +204,8 @@ def _with_scatter(question: _Question, mean: MeanFit) -> LaserFinding:
     words = tuple(f"{name}: detectable, but too small to matter." for name in slight)
     finding = replace(finding, small=(*finding.small, *slight), details=(*finding.details, *words))
     finding = replace(finding, next_experiment=_next(finding, assembly, question.recording, question.model))
-    shown = misfits(assembly, normal, made.parts())
-    return replace(finding, pictures=Pictures(shown, alternatives(made.found), noise_rows(normal), scatter.comparisons))
+    shown, noise = misfits(assembly, normal, made.parts()), noise_rows(mean.fit.normal)
+    return replace(finding, pictures=Pictures(shown, alternatives(made.found), noise, scatter.comparisons))
 
 
 def _with_rest(
@@ -269,7 +269,7 @@ def _finding(
     causes = tuple(cause for cause in causes if not any(cause.id in group for group in confounded))
     small = tuple(name for name in sizes if name not in matters and p.get(name, 0.0) >= NAMED)
     passing = fit.assembly.passing_objects
-    details = (_noise_sentences(assembly, normal), *shortcomings(assembly), *_sentences(sizes, small))
+    details = (_noise_sentences(assembly, fit.normal), *shortcomings(assembly), *_sentences(sizes, small))
     details += (f"laser: {passing.words}: its readings are set aside.",) if passing.many else ()
     causes, added = with_scatter(causes, settings, scatter.effects)
     open_ids = {name for group in confounded for name in group if name in estimates}
