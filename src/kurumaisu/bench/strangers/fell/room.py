@@ -69,7 +69,8 @@ class Room:
         out = ['name "room"', 'define wall model ( color "gray30" gui_move 0 )']
         for i, ((cx, cy, a, sx, sy), dark) in enumerate(zip(self.boxes, self.dark, strict=True)):
             place = f"[{cx:.6f} {cy:.6f} 0 {np.degrees(a):.9f}] size [{sx:.6f} {sy:.6f} 1.0]"
-            out.append(f'wall ( name "b{i}" pose {place} color "{"black" if dark else "white"}" )')
+            paint = 'color "black" ranger_return 0.2' if dark else 'color "white"'
+            out.append(f'wall ( name "b{i}" pose {place} {paint} )')
         return "\n".join(out) + "\n"
 
 

@@ -48,9 +48,10 @@ class Room:
     def world(self, flip: bool = False) -> str:
         """Return the text of a Stage world, of the mirrored room if asked."""
         text = ['name "room"', "define wall model", "(", '  color "gray30"', "  gui_move 0", ")"]
-        for name, x, y, sx, sy, yaw, shape in self.things:
+        for (name, x, y, sx, sy, yaw, shape), dark in zip(self.things, self.dark.tolist(), strict=True):
             at, turn = (self.width - x, -float(yaw)) if flip else (x, yaw)
             head = f'name "{name}" pose [{at:.6g} {y:.6g} 0 {turn:.6g}] size [{sx:.6g} {sy:.6g} 1.0]'
+            head += " ranger_return 0.2" * bool(dark)
             if len(shape) == 4:
                 text.append(f"wall ( {head} )")
                 continue

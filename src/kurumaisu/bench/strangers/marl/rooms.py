@@ -39,8 +39,8 @@ class Room:
         out = ['name "marl"', 'define wall model ( color "gray30" gui_move 0 )', ""]
         for i, b in enumerate(self.boxes):
             pose, size = f"{b.x:.4f} {b.y:.4f} 0 {np.degrees(b.angle):.4f}", f"{b.sx:.4f} {b.sy:.4f} 1.0"
-            color = "black" if b.dark else "white"
-            out.append(f'wall ( name "b{i}" pose [{pose}] size [{size}] color "{color}" )')
+            paint = 'color "black" ranger_return 0.2' if b.dark else 'color "white"'
+            out.append(f'wall ( name "b{i}" pose [{pose}] size [{size}] {paint} )')
         return "\n".join(out) + "\n"
 
     def mirrored(self) -> Room:
