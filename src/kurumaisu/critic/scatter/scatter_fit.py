@@ -25,6 +25,7 @@ from kurumaisu.types import BoolArray, FloatArray
 _NULLS = 50  # simulations of the model as it is, for the covariance of the statistics
 # In units of a parameter's scale, tried first: a thousandth of the readings shows.
 _SIZES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+_PARTS = (0.25, 0.5, 0.75)  # of the way between two of these, which no simulation is needed for
 _HALVED = 12  # times that the way between two of these is halved at most, where readings pile up between them
 _ROUNDS = 4  # Gauss-Newton steps of a refit
 _SHARES = (1.0, 0.5, 0.2)  # of such a step, tried in turn
@@ -200,7 +201,8 @@ class ScatterFit:
         )
 
     def _rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
-        """Return the best of some sizes of one form's parameters."""
+        """Return the best of some sizes of one form's parameters, and of sizes between them."""
+        pushes = [*pushes, *_between(pushes)]
         names = dict.fromkeys(push.name for push in pushes)
         changes = {(push.name, push.value): push.change for push in pushes}
         low, best = np.inf, dict[str, float]()
@@ -321,6 +323,19 @@ class ScatterFit:
         form = np.array([_of_form(piece, p) if p.name not in shapes else (0.0, 0.0) for p in parameters])
         both = np.hypot(sds[:, np.newaxis], form).tolist()
         return {p.name: (low, high) for p, (low, high) in zip(parameters, both, strict=True) if p.name in piece.free}
+
+
+def _between(pushes: Sequence[StatisticsChange]) -> Iterator[StatisticsChange]:
+    """Yield what sizes of a parameter between those that were simulated do, as if the statistics followed them evenly.
+
+    Of two forms of an effect that which happens to be met by one of the sizes would seem the better one.
+    """
+    ordered = sorted(pushes, key=lambda push: (push.name, push.value))
+    for low, high in pairwise(ordered):
+        if low.name == high.name:
+            for share in _PARTS:
+                change = (1 - share) * low.change + share * high.change
+                yield replace(low, value=(1 - share) * low.value + share * high.value, change=change)
 
 
 def _of_form(piece: ScatterPiece, p: Parameter) -> tuple[float, float]:
