@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 
 from kurumaisu.critic.sanity import pose_jumps
-from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.recording import Run, Series
+from kurumaisu.params import load_model, shipped
 
+MODEL = load_model(shipped("launch/md100.yaml"))
 RATE, SPEED, TURN = 30.0, 0.35, 0.3  # [1/s, m/s, rad/s]
 
 
@@ -22,7 +24,7 @@ def said(t, poses, command=None):
     return pose_jumps.problems(Series(t, poses, ("x", "y", "theta")), command)
 
 
-@pytest.mark.parametrize("heard", [True, False])
+@pytest.mark.parametrize("heard", ["command", "voltage", None])
 def test_a_chair_that_is_asked_to_be_fast_for_once_has_not_jumped(heard):
     """Half a second of 0.66 m/s in half a minute of 0.3, seen every 0.3 s: 0.2 m between two poses."""
     t = np.arange(0.0, 30.0, 0.3)
@@ -31,8 +33,13 @@ def test_a_chair_that_is_asked_to_be_fast_for_once_has_not_jumped(heard):
     held = asked[np.searchsorted(asked[:, 0], fine, side="right") - 1, 1]
     x = np.interp(t, fine, np.cumsum(held) * 0.01)
     poses = np.column_stack([x, 0.0 * t, 0.0 * t]) + 0.003 * np.random.default_rng(3).standard_normal((len(t), 3))
-    command = Series(asked[:, 0], asked[:, 1:], ("v", "w"))
-    assert bool(said(t, poses, command if heard else None)) != heard
+    volts = [[MODEL.translation.volts(v), 0.0] for v in asked[:, 1]]
+    parts = {
+        "command": Series(asked[:, 0], asked[:, 1:], ("v", "w")),
+        "voltage": Series(asked[:, 0], np.array(volts), ("v_f", "v_s")),
+    }
+    run = Run("drive", **{name: part for name, part in parts.items() if name == heard})
+    assert bool(said(t, poses, pose_jumps.asked(run, MODEL))) == (heard is None)
 
 
 def test_a_jump_is_seen_in_a_drive_with_commands():

@@ -112,7 +112,7 @@ def _of_run(run: Run, model: Model, *, first: bool) -> list[str]:
         follows[name] = plain.correlation
         lawful &= match is plain
     words = _one(headings.heading_words(found, *_agreement(found.factor, known))) if found is not None else []
-    words += [*pose_jumps.problems(run.pose, run.command), *_one(rows.blocks(run.pose, "pose"))]
+    words += [*pose_jumps.problems(run.pose, pose_jumps.asked(run, model)), *_one(rows.blocks(run.pose, "pose"))]
     words += _one(headings.folded(run.pose))
     words += [] if found is not None and not found.right else imu_match.problems(run)
     # Poses that were worked out repeat themselves at rest, to the last bit; measured ones never do.

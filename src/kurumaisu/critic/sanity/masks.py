@@ -17,6 +17,7 @@ from kurumaisu.critic.base.drive import prepare
 from kurumaisu.critic.sanity import imu_match
 from kurumaisu.critic.sanity.contacts import TOPIC, contacts
 from kurumaisu.critic.sanity.displaced_rows import NEAR, Spans, displaced_rows
+from kurumaisu.critic.sanity.pose_jumps import asked
 from kurumaisu.critic.sanity.rows import stale
 from kurumaisu.critic.values.digits import moment, quantities
 from kurumaisu.critic.values.recording import Recording, Run, Series
@@ -70,7 +71,7 @@ def _masked(run: Run, model: Model) -> tuple[Run, list[str]]:
         return run, []
     pose, words = _fresh(run.name, run.pose)
     run = replace(run, pose=pose)
-    spans = displaced_rows(pose, run.command)
+    spans = displaced_rows(pose, asked(run, model))
     off = np.zeros(len(pose.t), dtype=np.bool_)
     for first, end, _ in spans:
         off[first:end] = True

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from kurumaisu.critic.base.drive import from_voltages
 from kurumaisu.critic.sanity.headings import position_noise
 from kurumaisu.critic.sanity.rows import MOVING
 from kurumaisu.critic.values.digits import moment, times
-from kurumaisu.critic.values.recording import Series
+from kurumaisu.critic.values.recording import Run, Series
 from kurumaisu.critic.values.robust import third_difference_sd
+from kurumaisu.params import Model
 from kurumaisu.types import BoolArray, FloatArray
 
 _FAR = 10.0  # robust sd of the reference that a jump exceeds
@@ -30,6 +32,14 @@ _MOSTLY = 0.8  # share of the rows by which stamps are judged
 _JITTER = 0.05  # [s] of their error, from which it is more than rows written on a grid
 _TRUE = 0.7  # of the stamps' variation that the way follows, below which
 _SURE = 4.0  # standard errors away from it the stamps are wrong
+
+
+def asked(run: Run, model: Model) -> Series | None:
+    """Return the rates v, w that a run was asked for, by its commands or else by its voltages; None without either."""
+    if run.command is not None or run.voltage is None or not len(run.voltage.t):
+        return run.command
+    t, v, w = from_voltages(run, model)
+    return Series(t, np.column_stack([v, w]), ("v", "w"))
 
 
 def problems(pose: Series, command: Series | None = None) -> list[str]:
