@@ -86,12 +86,6 @@ def scan_findings(
 
     ids: the effects that may be named; None for all.
     """
-    why = why_not_usable(recording)
-    if why is not None:
-        drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
-        refused = LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
-        yield from (refused, refused)
-        return
     found = _findings(_Question(recording, model, progress, ids), posed=False)
     first = next(found)
     yield first
@@ -104,6 +98,11 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
     posed: whether the laser may be elsewhere than the reference says from the start on; else this is asked at the end.
     """
     recording, model, progress, ids = question.recording, question.model, question.progress, question.ids
+    why = why_not_usable(recording)
+    if why is not None:
+        drive = supplying_experiment(model, every_id(), recording.truth) if recording.world is not None else None
+        yield LaserFinding(refused=why, details=repeatability.sentences(recording, model), next_experiment=drive)
+        return
     progress("laser: predicting the scans")
     assembly = Assembly(gather_stands(recording, model), ids)
     progress("laser: estimating the noise")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """How laser readings err at random, estimated on every data set: beams, neighbours, scans, poses.
 
-Readings of one scan share its pose and its common mode, neighbours share light and wall. Counting 170 000 readings as
+Readings of one scan share its pose and its common mode, neighbours share light and wall. Counting 100 000 readings as
 so many independent ones makes a critic certain of effects that are not there.
 """
 

@@ -14,7 +14,7 @@ from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEqua
 from kurumaisu.critic.values.story import FOLLOWED, Alternative, Misfit, Moments, NoiseParameter, bins, explained
 from kurumaisu.types import FloatArray, IntArray
 
-_SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 170 000, no mean is a picture's width off
+_SAMPLES = 20_000  # readings of which means are drawn, evenly taken: of 100 000, no mean is a picture's width off
 _ALTERNATIVES = 6
 _LEAST = 1e-6  # [m], [rad] sd of an error that is none
 

@@ -51,9 +51,8 @@ class ParameterFit:
 
     assembly: the scans as they are seen with these effects, where any of them moves beams; normal: the noise there, as
     far as it was estimated anew; block (k, b, m) [m]: what acts besides, per prior sd of each of its coefficients;
-    left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are
-    only nearly right may have wrong in it, 1 sd; slopes (k, b, p) [m]: how the mean follows what was fitted, per prior
-    sd of each.
+    left (k, b) [m]: of the residual there; missed (k, b, n) [m]: what equations that are only nearly right may have
+    wrong in it, 1 sd; slopes (k, b, p) [m]: how the mean follows what was fitted, per prior sd of each.
     """
 
     settings: tuple[tuple[EffectSetting, dict[str, float]], ...]
