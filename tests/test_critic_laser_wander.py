@@ -45,14 +45,27 @@ def test_a_reference_that_wanders_is_no_mounting(tmp_path, seed):
     assert (finding.causes, finding.confounded, finding.unknown) == ((), (), ())
 
 
-def test_walls_that_are_off_are_neither_a_common_mode_nor_the_references_errors(tmp_path, monkeypatch):
+def with_walls_off(folder, effect, size, monkeypatch):
+    """Return a recording in a room whose walls are 1 cm off in its map."""
     drawn, rng = laser_scene.BOXES, np.random.default_rng(5)
     there = tuple((name, *(np.array([x, y]) + 0.01 * rng.standard_normal(2)), *more) for name, x, y, *more in drawn)
     monkeypatch.setattr(laser_scene, "BOXES", there)
-    data = recording(tmp_path, None, 0.0, 5, scans=100)
+    data = recording(folder, effect, size, 5, scans=100)
     monkeypatch.setattr(laser_scene, "BOXES", drawn)
     laser_scene.write_world(data.world)
+    return data
+
+
+def test_walls_that_are_off_are_neither_a_common_mode_nor_the_references_errors(tmp_path, monkeypatch):
+    data = with_walls_off(tmp_path, None, 0.0, monkeypatch)
     finding = criticise_scans(data, MODEL, lambda _: None, frozenset({"world.map_error", "laser.common_mode"}))
     assert [cause.id for cause in finding.causes] == ["world.map_error"]
     (common,) = (one for one in finding.pictures.noise if one.name == "laser: error common to a whole scan")
     assert common.estimate < 0.002
+
+
+def test_walls_that_are_off_hide_nothing_smaller(tmp_path, monkeypatch):
+    data = with_walls_off(tmp_path, "laser.temperature", 0.004, monkeypatch)
+    asked = frozenset({"world.map_error", "laser.temperature", "laser.offset", "laser.warmup", "laser.scale"})
+    finding = criticise_scans(data, MODEL, lambda _: None, asked)
+    assert {cause.id for cause in finding.causes} == {"world.map_error", "laser.temperature"}

@@ -83,26 +83,26 @@ class FurtherEffects:
 def further_effects(
     assembly: Assembly,
     normal: NormalEquations,
-    found: FormPosterior,
-    fit: FittedForms,
+    made: MeanEffects,
     refitted: ParameterFit,
-    others: Mapping[str, FormFamily],
 ) -> FurtherEffects | None:
-    """Return what acts beside a fit that was refitted; None where nothing does.
+    """Return what acts beside what was found and refitted; None where nothing does.
 
-    normal: with noise that was estimated whatever else acts; found: of the search that the fit is from; others: curves
-    that effects of the fit may follow instead.
+    normal: with noise that was estimated whatever else acts.
     """
-    known = {_key(form): form for form in assembly.forms if form.id not in fit.ids}
-    if not known or not _promising(found, fit):
+    fit, others, walls = made.fit, made.others, made.winner is not None
+    acting = fit.ids if made.winner is None else made.winner.ids
+    known = {_key(form): form for form in assembly.forms if form.id not in acting}
+    if not known or not (walls or _promising(made.found, fit)):
         return None
     # Seen anew: how far a chair turns within a delay is told by a path that the loud effect had bent.
     forms, columns = refitted.assembly.marks.forms(frozenset(form.id for form in known.values()))
     rest = [form for form in forms if _key(form) in known]
-    # While a delay, say, is not in place, a path through the scans is too smooth beside jumps of the rates.
+    # While a delay, say, is not in place, a path through the scans is too smooth beside jumps of the rates. What walls
+    # that are off do to whole scans is no noise, as it seemed to be without them.
     beams = refitted.normal.beam_noise
     beams = replace(beams, valid=beams.valid & normal.beam_noise.valid)
-    refitted = replace(refitted, normal=replace(normal, beam_noise=beams))
+    refitted = replace(refitted, normal=replace(refitted.normal if walls else normal, beam_noise=beams))
     # Curves that effects of the fit may follow instead, and what these effects do (k, b) [m].
     parts = [(others[form.id], form, size) for form, size in fit.parts() if form.id in others]
     curves = [(curve, assembly.columns[:, :, form.span] @ size) for curve, form, size in parts]
@@ -156,15 +156,16 @@ def _doubted(
     count = sum(part.shape[2] for part in parts)
     free = [curve.columns(there.shots, there.marks.seen) for curve, _ in curves]
     signals = [change[:, :, np.newaxis] for _, change in curves]
-    gram = there.products(refitted.normal, [*parts, refitted.slopes, *free, *signals], left)
-    ends = np.cumsum([count, refitted.slopes.shape[2], *(part.shape[2] for part in free)])
+    known = np.concatenate([refitted.slopes, refitted.block], axis=2)
+    gram = there.products(refitted.normal, [*parts, known, *free, *signals], left)
+    ends = np.cumsum([count, known.shape[2], *(part.shape[2] for part in free)])
     powers = np.diag(gram)[ends[-1] : -1].tolist()
     spans = [slice(low, high) for low, high in pairwise(ends[1:].tolist())]
     families = [(span, curve, power) for span, (curve, _), power in zip(spans, curves, powers, strict=True)]
     drawn, keep = np.arange(count, ends[-1]), np.r_[np.arange(count), len(gram) - 1]
 
     def weighed(shares: Shares) -> tuple[FloatArray, float]:
-        prior = block_diag(np.eye(refitted.slopes.shape[2]), *priors_in(gram, families, shares))
+        prior = block_diag(np.eye(known.shape[2]), *priors_in(gram, families, shares))
         made = integrated_out(gram, drawn, prior)
         volume = np.linalg.slogdet(np.eye(len(drawn)) + gram[np.ix_(drawn, drawn)] @ prior)[1]
         return made[np.ix_(keep, keep)], -0.5 * float(made[-1, -1] + volume)
@@ -313,12 +314,12 @@ def settled(
     assembly: Assembly, normal: NormalEquations, made: MeanEffects, fit: ParameterFit, truth: tuple[float, float] | None
 ) -> tuple[MeanEffects, ParameterFit]:
     """Return what acts without what its refit takes back, and with what acts beside it, refitted."""
-    while made.winner is None:
-        gone = vanished_effects(assembly, made.fit, fit)
+    while made.winner is None or made.winner.free.basis is None:
+        gone = vanished_effects(assembly, made.fit, fit) if made.winner is None else frozenset()
         if gone:
             more = None if made.more is None else made.more.without(gone)
             made = replace(made, fit=made.fit.without(gone), more=more)
-        elif made.more is None and (more := further_effects(assembly, normal, made.found, made.fit, fit, made.others)):
+        elif made.more is None and (more := further_effects(assembly, normal, made, fit)):
             made = made.with_further(assembly, normal, more)
         else:
             break
