@@ -6,7 +6,7 @@ import pytest
 
 from kurumaisu import effects
 from kurumaisu.critic.judge.scan_verdict import size_of
-from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, common_mode, estimate
+from kurumaisu.critic.ranges.noise.scan_noise import CommonMode, NoiseLikelihood, common_mode, estimate
 from kurumaisu.critic.ranges.noise.shared_errors import Gram, Grams, Layout, ScanNoise
 from kurumaisu.critic.ranges.search.effect_sets import FormSearch
 from kurumaisu.critic.ranges.signals.effect_columns import Column, Form
@@ -162,8 +162,9 @@ def _scans(common, seed, scans=250, readings=400, sd=0.004):
 def _weighed(common, seed, own=0.0):
     grams, layout = _scans(common, seed)
     none = np.arange(0)
-    noise = estimate(grams, layout, (0.005, 0.005), none)
-    return common_mode(grams, layout, (0.005, 0.005), none, noise, own), noise
+    likelihood = NoiseLikelihood(grams, layout, none)
+    noise = estimate(likelihood, (0.005, 0.005))
+    return common_mode(likelihood, (0.005, 0.005), noise, own), noise
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

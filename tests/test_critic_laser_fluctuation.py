@@ -7,7 +7,7 @@ import pytest
 from kurumaisu import effects
 from kurumaisu.bench.hidden import Ask, make
 from kurumaisu.critic.judge.scan_verdict import criticise_scans
-from kurumaisu.critic.ranges.noise.scan_noise import _Likelihood, with_lasting_common_mode
+from kurumaisu.critic.ranges.noise.scan_noise import NoiseLikelihood, with_lasting_common_mode
 from kurumaisu.critic.ranges.noise.shared_errors import Gram, Grams, Layout, ScanNoise, whitened
 from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import cut_off_ends
@@ -131,7 +131,7 @@ def test_columns_that_others_draw_as_well_speak_for_no_noise():
         left = 0.002 * rng.standard_normal((40, 1))
         rows = whitened(np.hstack([np.ones((40, 1)), once, once, left]), beams, sd, 0.0)
         grams.append(Gram(rows.T @ rows, 0, 1))
-    few, many = (_Likelihood(Grams.summed(grams), layout, np.arange(n)) for n in (count, 2 * count))
+    few, many = (NoiseLikelihood(Grams.summed(grams), layout, np.arange(n)) for n in (count, 2 * count))
     noises = [ScanNoise(0.002, 0.001, common, 1.0) for common in (1e-5, 8e-4)]
     cost = [[likelihood(noise) for noise in noises] for likelihood in (few, many)]
     assert np.diff(cost[1]) == pytest.approx(np.diff(cost[0]), abs=1e-3)
@@ -152,7 +152,7 @@ def test_a_common_mode_may_last_as_long_as_stands_that_are_shorter_cannot_deny(t
         rows = whitened(columns, np.ones(beams, dtype=bool), np.full(beams, 0.001), 0.0)
         grams.append(Gram(rows.T @ rows, 0, 1))
     likeliest = ScanNoise(0.002, 0.001, 4.5e-4 if there else 2e-5, 1.0)
-    wary = with_lasting_common_mode(Grams.summed(grams), layout, np.arange(count), likeliest)
+    wary = with_lasting_common_mode(NoiseLikelihood(Grams.summed(grams), layout), likeliest)
     if not there:
         assert wary == likeliest, "there is none"
         return

@@ -23,7 +23,7 @@ from kurumaisu.critic.judge.scan_estimates import (
 )
 from kurumaisu.critic.judge.scan_experiment import every_id, shortcomings, supplying_experiment
 from kurumaisu.critic.judge.scatter_verdict import MeanFit, Scatter, material, open_set, scatter_effects
-from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN
+from kurumaisu.critic.ranges.noise.scan_noise import CERTAIN, beyond_stated
 from kurumaisu.critic.ranges.noise.shared_errors import pose_sds
 from kurumaisu.critic.ranges.poses.creeping_stands import gather_stands
 from kurumaisu.critic.ranges.scans import repeatability
@@ -128,7 +128,8 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
         return
     made, fit = settled(assembly, normal, made, fit, recording.truth)
     if recording.truth is not None:
-        beyond = fit.assembly.beyond_stated(fit.normal, recording.truth, made.fit.forms, fit.block)
+        likelihood = fit.assembly.noise_beside(fit.normal.beam_noise, made.fit.forms, fit.block)
+        beyond = beyond_stated(likelihood, recording.truth, fit.normal.scan_noise)
         # What equations nearly right leave of what acts looks like a reference that wanders, too.
         if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
             progress("laser: the reference errs by more than is said")

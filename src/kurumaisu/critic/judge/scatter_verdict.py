@@ -9,6 +9,7 @@ import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.heldout.materiality import MATERIAL
+from kurumaisu.critic.ranges.noise.scan_noise import common_mode
 from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
@@ -67,7 +68,9 @@ def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | N
     found = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
     if made.curve:
         return found
-    seen = fit.assembly.common_mode(fit.normal, recording.truth, made.fit.forms, fit.block, own)
+    likelihood = fit.assembly.noise_beside(fit.normal.beam_noise, made.fit.forms, fit.block)
+    seen = common_mode(likelihood, recording.truth, fit.normal.scan_noise, own)
+    seen = replace(seen, wary=fit.normal.wary)
     scatter = with_common_offset(found.effects, seen, fit.normal.scan_noise, recording, ids)
     scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)
     return replace(found, effects=scatter)

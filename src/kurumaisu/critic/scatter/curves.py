@@ -27,6 +27,7 @@ from kurumaisu.types import BoolArray, FloatArray
 _LAWS = ("range", "incidence")  # what equations of the noise follow: a curve over these is another form of one
 _LAW = 0.5  # sd of the log of a square by which such an equation may be off
 _HATS = 10
+_EVENTS = {"time": 40}  # what comes and goes bends more often
 _SEEDS = range(2000, 2030)  # simulations that say what squares are to be expected, and how far sums are off by chance
 _ENOUGH = 5.0  # [nat] from which a curve is told, as an effect on the scatter is
 _MATTERS = 0.1  # share of the noise by which it must make it differ
@@ -102,7 +103,7 @@ class ScatterCurves:
         out = []
         for name, values in at.items():
             own = values[self._trust]
-            knots = knots_of(own, _HATS) if np.isfinite(own).all() else np.empty(0)
+            knots = knots_of(own, _EVENTS.get(name, _HATS)) if np.isfinite(own).all() else np.empty(0)
             if len(knots) < 3:
                 continue
             low, high = np.quantile(own, [0.025, 0.975]).tolist()

@@ -54,12 +54,12 @@ class CommonMode:
         return sizes, taus
 
 
-class _Likelihood:
-    """The negative log restricted likelihood of a noise, and how far it is from what is usual."""
+class NoiseLikelihood:
+    """The negative log restricted likelihood of a noise: what common columns do is none."""
 
-    def __init__(self, grams: Grams, layout: Layout, project: IntArray) -> None:
-        """Take common columns to project out; the last common column is the residual."""
-        chosen = grams.only(project)
+    def __init__(self, grams: Grams, layout: Layout, project: IntArray | None = None) -> None:
+        """Take the common columns to project out, None for all; the last one is the residual."""
+        chosen = grams if project is None else grams.only(project)
         self._stacked = Stacked(chosen, layout)
         # Of columns that others draw as well, as a curve over the time does one over the heading of stands, nothing is
         # learnt, whatever the noise: what is known of them beforehand must not follow it. Else each of them speaks for
@@ -67,6 +67,7 @@ class _Likelihood:
         self._norms = np.sqrt(np.maximum(np.diag(chosen.common)[:-1], 1e-300))
 
     def __call__(self, noise: ScanNoise) -> float:
+        """Return it [nat], but for a constant."""
         s, log_det = self._stacked.marginal(noise)
         yy = float(s[-1, -1])
         x = s[:-1, :-1] / np.outer(self._norms, self._norms) + _WEAK * np.eye(len(s) - 1)
@@ -75,12 +76,12 @@ class _Likelihood:
         return 0.5 * (log_det + yy - fitted + float(np.linalg.slogdet(x)[1]))
 
 
-def estimate(grams: Grams, layout: Layout, truth: tuple[float, float] | None, project: IntArray) -> ScanNoise:
-    """Return the scans' noise by restricted maximum likelihood; project: common columns to project out.
+def estimate(likelihood: NoiseLikelihood, truth: tuple[float, float] | None) -> ScanNoise:
+    """Return the scans' noise by restricted maximum likelihood.
 
-    The last common column is the residual. truth: sds of the reference as somebody says, if anybody does.
+    truth: sds of the reference [m, rad] as somebody says, if anybody does.
     """
-    likelihood, usual, known = _Likelihood(grams, layout, project), np.log(_USUAL), 0
+    usual, known = np.log(_USUAL), 0
     if truth is not None:
         usual[:2], known = np.log(np.maximum(truth, 1e-5)), 2
     none = np.where(np.isin(np.arange(7), (4, 5)), np.log(_NONE), usual)
@@ -94,14 +95,12 @@ def estimate(grams: Grams, layout: Layout, truth: tuple[float, float] | None, pr
     return _likeliest(likelihood, usual, free, np.log(astuple(begun))[free], stated=truth is not None)
 
 
-def beyond_stated(
-    grams: Grams, layout: Layout, truth: tuple[float, float], project: IntArray, noise: ScanNoise
-) -> float:
-    """Return what says [nat] that a reference errs by more, or longer, than is said, by all its scans; as of estimate.
+def beyond_stated(likelihood: NoiseLikelihood, truth: tuple[float, float], noise: ScanNoise) -> float:
+    """Return what says [nat] that a reference errs by more, or longer, than is said, by all its scans.
 
-    noise: the likeliest that it may have as stated.
+    truth: sds [m, rad] as stated; noise: the likeliest that it may have as stated.
     """
-    likelihood, usual = _Likelihood(grams, layout, project), np.log(_USUAL)
+    usual = np.log(_USUAL)
     usual[:2] = np.log(np.maximum(truth, 1e-5))
     begun = [_wandering(noise, size, stated=False) for size in (max(noise.lasting, _NONE), *_TRIED)]
     at = np.log(astuple(min(begun, key=likelihood)))
@@ -110,13 +109,12 @@ def beyond_stated(
     return likelihood(noise) - likelihood(free) - 0.5 * float(far @ far)
 
 
-def with_lasting_common_mode(grams: Grams, layout: Layout, project: IntArray, noise: ScanNoise) -> ScanNoise:
+def with_lasting_common_mode(likelihood: NoiseLikelihood, noise: ScanNoise) -> ScanNoise:
     """Return a noise whose common mode, where there is one for sure, is the mean of those that last longer, too.
 
     The scans of a stand tell how far it wanders while they last. How far it comes until the next stand is told by no
     more than that: the longer it lasts, the farther. Effects of the time or of the place must be surer than that.
     """
-    likelihood = _Likelihood(grams, layout, project)
     least = likelihood(noise)
     if likelihood(replace(noise, common_sd=FLOOR)) - least < CERTAIN:
         return noise
@@ -137,14 +135,9 @@ def with_lasting_common_mode(grams: Grams, layout: Layout, project: IntArray, no
 
 
 def common_mode(
-    grams: Grams,
-    layout: Layout,
-    truth: tuple[float, float] | None,
-    project: IntArray,
-    noise: ScanNoise,
-    own_sd: float = 0.0,
+    likelihood: NoiseLikelihood, truth: tuple[float, float] | None, noise: ScanNoise, own_sd: float = 0.0
 ) -> CommonMode:
-    """Return what says that scans have a common mode, by all of them; noise: the likeliest one, other arguments alike.
+    """Return what says that scans have a common mode, by all of them; noise: the likeliest one, truth as of estimate.
 
     own_sd [m]: of what the model already has, which then needs another one; of how long that lasts the model knows
     only from scan to scan. By Laplace's approximation of the integral over its sd and its time constant. One as large
@@ -152,7 +145,6 @@ def common_mode(
     """
     if noise.common_sd > _WHOLE * _HIGH[2]:
         return CommonMode(-np.inf, 1.0, 1.0)
-    likelihood = _Likelihood(grams, layout, project)
 
     def cost(x: FloatArray) -> float:
         sd, tau = (np.array([noise.common_sd, noise.common_tau]) * np.exp(x)).tolist()
@@ -190,7 +182,7 @@ def _wandering(noise: ScanNoise, lasting: float, *, stated: bool) -> ScanNoise:
 
 
 def _likeliest(
-    likelihood: _Likelihood,
+    likelihood: NoiseLikelihood,
     usual: FloatArray,
     free: IntArray,
     begin: FloatArray | None = None,

@@ -11,13 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kurumaisu.critic.ranges.noise.reading_noise import OUTLIER, BeamNoise, estimate_reading_noise, expected_readings
-from kurumaisu.critic.ranges.noise.scan_noise import (
-    CommonMode,
-    beyond_stated,
-    common_mode,
-    estimate,
-    with_lasting_common_mode,
-)
+from kurumaisu.critic.ranges.noise.scan_noise import NoiseLikelihood, estimate, with_lasting_common_mode
 from kurumaisu.critic.ranges.noise.shared_errors import (
     Gram,
     Grams,
@@ -236,8 +230,9 @@ class Assembly:
             )
         narrow = max(self._fixed, self._nuisance.stop, *(free.span.stop for free in self.free if free.whole))
         grams, cross = self._crossed(beam, narrow)
-        scan = estimate(grams, self.layout, truth, project)
-        wary = with_lasting_common_mode(grams, self.layout, project, scan)
+        likelihood = NoiseLikelihood(grams, self.layout, project)
+        scan = estimate(likelihood, truth)
+        wary = with_lasting_common_mode(likelihood, scan)
         gram = without_beam_offsets(grams, cross, self.layout, wary, beam.own_sd)
         return NormalEquations(gram, scan, wary, beam, int(beam.valid.sum()))
 
@@ -247,43 +242,14 @@ class Assembly:
         spans.append(self._nuisance)
         return np.concatenate([np.arange(0), *(np.arange(span.start, span.stop) for span in spans)])
 
-    def common_mode(
-        self,
-        normal: NormalEquations,
-        truth: tuple[float, float] | None,
-        fitted: Sequence[Form],
-        block: FloatArray,
-        own_sd: float = 0.0,
-    ) -> CommonMode:
-        """Return what says that whole scans are off together, whatever effects on the mean there are.
+    def noise_beside(self, beam: BeamNoise, fitted: Sequence[Form], block: FloatArray) -> NoiseLikelihood:
+        """Return how likely the noise of scans is, whatever effects on the mean there are: what these do is none.
 
-        fitted: forms that act, with their shapes; block (k, b, m): columns that act besides; own_sd [m]: of whole scans
-        in the model.
+        fitted: forms that act, with their shapes; block (k, b, m): columns that act besides.
         """
-        grams, every = self._without(normal, fitted, block)
-        seen = common_mode(grams, self.layout, truth, every, normal.scan_noise, own_sd)
-        return replace(seen, wary=normal.wary)
-
-    def beyond_stated(
-        self, normal: NormalEquations, truth: tuple[float, float], fitted: Sequence[Form], block: FloatArray
-    ) -> float:
-        """Return what says [nat] that the reference errs by more than is said; fitted, block: as of common_mode."""
-        grams, every = self._without(normal, fitted, block)
-        return beyond_stated(grams, self.layout, truth, every, normal.scan_noise)
-
-    def settled_beside(
-        self, normal: NormalEquations, truth: tuple[float, float] | None, fitted: Sequence[Form], block: FloatArray
-    ) -> NormalEquations:
-        """Return the noise of scans with a block of columns (k, b, m) that acts: what it does is none."""
-        grams, every = self._without(normal, fitted, block)
-        scan = estimate(grams, self.layout, truth, every)
-        return replace(normal, scan_noise=scan, wary=with_lasting_common_mode(grams, self.layout, every, scan))
-
-    def _without(self, normal: NormalEquations, fitted: Sequence[Form], block: FloatArray) -> tuple[Grams, IntArray]:
-        """Return the grams that noise is told by, and which of their columns it is none of: all."""
         other = copy(self)
         other.columns = np.concatenate([self.columns[:, :, self._projected(fitted)], block], axis=2, dtype=np.float32)
-        return other.grams(normal.beam_noise, lasting=True), np.arange(other.columns.shape[2])
+        return NoiseLikelihood(other.grams(beam, lasting=True), self.layout)
 
     def full(self, normal: NormalEquations) -> NormalEquations:
         """Return the normal equations of all columns, in the noise that is known."""

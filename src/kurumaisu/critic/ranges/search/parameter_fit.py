@@ -9,13 +9,14 @@ and a size is only as sure as the shape that it belongs to.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.linalg import block_diag
 
 from kurumaisu import effects
+from kurumaisu.critic.ranges.noise.scan_noise import estimate, with_lasting_common_mode
 from kurumaisu.critic.ranges.search.block_evidence import SetWithBlock
 from kurumaisu.critic.ranges.search.normal_equations import Assembly, NormalEquations
 from kurumaisu.critic.ranges.signals.effect_columns import Form
@@ -86,7 +87,9 @@ def fit_parameters(
     block = np.empty((*assembly.residual.shape, 0))  # in units in which its coefficients have a prior sd of 1
     if winner is not None:
         block = np.asarray(assembly.columns[:, :, winner.free.span] @ root_of(winner.evidence.prior))
-        normal = assembly.settled_beside(normal, truth, forms, block)
+        likelihood = assembly.noise_beside(normal.beam_noise, forms, block)
+        scan = estimate(likelihood, truth)
+        normal = replace(normal, scan_noise=scan, wary=with_lasting_common_mode(likelihood, scan))
     # What is as large as a reading's own scatter has moved poses, and made outliers of readings, as much.
     moving = strength(assembly, normal, assembly.marks.together(_settings(forms, at))) > STRONG or any(
         not issubclass(effects.by_id(form.id), effects.ReadingEffect) for form in forms
