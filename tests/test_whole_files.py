@@ -42,9 +42,9 @@ EXCEPTIONS = {
     "bench/slam/ours.py": {"savez": "scratch, handed to a process of our own"},
     "bench/peers.py": {"tofile": "scratch, handed to a peer's program"},
     "bench/strangers/fell/files.py": {"write_text": MADE},
-    "bench/strangers/knoll/files.py": {"write_text": MADE},
-    "bench/strangers/marl/writing.py": {"write_text": MADE},
+    "bench/strangers/loess/writing.py": {"write_text": MADE},
     "bench/strangers/quay/writing.py": {"write_text": MADE},
+    "bench/strangers/scree/writing.py": {"write_text": MADE},
 }
 
 

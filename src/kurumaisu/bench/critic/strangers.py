@@ -28,7 +28,7 @@ from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
 from kurumaisu.params import shipped
 
-GENERATORS = ("knoll", "marl", "fell", "quay")  # the first two to report on
+GENERATORS = ("scree", "loess", "fell", "quay")  # the first two to report on
 KINDS = ("null", "single", "form", "pair", "triple", "unknown", "confounded", "wrong")
 _Z, _BESIDE, _BESIDE_OTHERS = 10.0, 6.0, 4.0  # what a case must show to count
 _NAMED = 0.9
