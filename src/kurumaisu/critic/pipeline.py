@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,9 +28,9 @@ from kurumaisu.critic.sanity import examination, masks
 from kurumaisu.critic.values.criticism import Criticism, LaserFinding, Progress
 from kurumaisu.critic.values.recording import Recording
 from kurumaisu.critic.values.selection import those
-from kurumaisu.critic.values.verdict import verdict_text
+from kurumaisu.critic.values.verdict import Cause, verdict_text
 from kurumaisu.errors import Error
-from kurumaisu.params import Model
+from kurumaisu.params import EffectSetting, Model
 from kurumaisu.whole_files import write_whole
 
 
@@ -69,15 +70,8 @@ def criticise(
         if base is not None and extension.points:
             base, extension = _beside_scans(base, extension, scans, whole, model, progress, ids)
         found = base or explain.undriven(recording, model)
-
-        def again(moved: Recording) -> LaserFinding:
-            return criticise_scans(moved, model, progress, ids)
-
-        seen, stamped = by_its_clock(found.verdict.causes, scans, scanned, model, again)
-        there, settings = from_base_link(found.verdict.causes, seen, stamped, model, again)
-        if there is scans:  # not only the mean readings, but how they scatter: where they are seen from is settled
-            there = next(findings)
-            settings = there.settings
+        told = (scans, findings)
+        there, stamped, settings = _as_seen(found.verdict.causes, told, scanned, model, progress, ids)
     forecast = extension.forecast
     if forecast is not None and stamped is not scanned:
         forecast = replace(forecast, settings=by_commands(forecast.settings, model))
@@ -97,6 +91,31 @@ def criticise(
     every = (*found.settings, *(each for each in settings if each not in found.settings))
     ranges = list(predictions.ranges(stamped, model, forecast, every))
     return replace(found, predictions=tuple(predictions.predictions(whole, extension.forecast, ranges)))
+
+
+def _as_seen(
+    causes: Sequence[Cause],
+    told: tuple[LaserFinding, Iterator[LaserFinding]],
+    recording: Recording,
+    model: Model,
+    progress: Progress,
+    ids: frozenset[str] | None,
+) -> tuple[LaserFinding, Recording, tuple[EffectSetting, ...]]:
+    """Return what scans say from where they are taken, by causes in the base, and when; the recording; all that acts.
+
+    told: what they say by their mean readings, and what they go on to say.
+    """
+    scans, findings = told
+
+    def again(moved: Recording) -> LaserFinding:
+        return criticise_scans(moved, model, progress, ids)
+
+    seen, stamped = by_its_clock(causes, scans, recording, model, again)
+    there, settings = from_base_link(causes, seen, stamped, model, again)
+    if there is scans:  # not only the mean readings, but how they scatter: where they are seen from is settled
+        there = next(findings)
+        settings = there.settings
+    return there, stamped, settings
 
 
 def _beside_scans(
