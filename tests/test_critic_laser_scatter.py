@@ -17,7 +17,7 @@ from kurumaisu.critic.ranges.scans.gathering import gather
 from kurumaisu.critic.ranges.scans.valid_readings import grid_step
 from kurumaisu.critic.ranges.search.normal_equations import Assembly
 from kurumaisu.critic.scatter.likelihood import StatisticKinds
-from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece, StatisticsChange
+from kurumaisu.critic.scatter.scatter_fit import ScatterFit, ScatterPiece
 from kurumaisu.critic.scatter.scatter_search import ScatterSearch
 from kurumaisu.critic.scatter.simulation import ScatterSimulator
 from kurumaisu.critic.scatter.statistics import Statistics, _Edges, _once, _spacing
@@ -69,21 +69,6 @@ def test_what_is_likeliest_alone_is_weighed_again_in_company():
     ids = frozenset({"laser.quantisation", "laser.beam_correlation", "laser.incidence_noise"})
     found = ScatterSearch(ScatterFit(simulate, simulate(truth, 5), (), ids)).run()
     assert {each.setting.id for each in found} == {setting.id for setting in truth}
-
-
-class _Seldom(_Linear):
-    """As strays do: of a few more in a thousand readings there may be none."""
-
-    def __call__(self, settings, seed):
-        return np.floor(super().__call__(settings, seed) + 0.5)
-
-
-def test_what_is_too_rare_for_a_small_step_to_show_is_moved_by_a_longer_one():
-    simulate = _Seldom({"laser.heavy_tails.outliers": (60.0, 60.0, 60.0, 0.0, 0.0)})
-    fit = ScatterFit(simulate, simulate([at("laser.heavy_tails", outliers=0.0024)], 5), (), frozenset())
-    start = at("laser.heavy_tails", outliers=0.0006)
-    (found,), _ = fit.together([ScatterPiece(effects.by_id(start.id), start, ("outliers",))], ())
-    assert 0.0014 < found.setting.parameters["outliers"] < 0.0026
 
 
 class _Tails(_Linear):
@@ -395,17 +380,3 @@ def test_neighbours_that_share_little_are_told_where_readings_are_many(tmp_path,
     if told:
         rho_told = finding.causes[0].parameters["rho"]
         assert rho_told.lo90 < rho < rho_told.hi90
-
-
-def test_a_form_is_chosen_by_the_best_of_its_sizes_be_it_simulated_or_not():
-    fit = object.__new__(ScatterFit)
-    fit.likeness = SimpleNamespace(cost=lambda numbers: float(np.sum((numbers - 2.0) ** 2)))
-    effect = effects.by_id("laser.incidence_noise")
-    met = {0.0: np.array([2.2, 1.6]), 1.0: np.array([1.0, 1.0])}  # at a size of 1, by form: the usual one comes nearer
-    pushes = [
-        StatisticsChange(effect, {"tangent": form}, "gain", size, size * change)
-        for form, change in met.items()
-        for size in (1.0, 3.0)
-    ]
-    found = fit.rough(pushes, np.zeros(2))
-    assert (found.form, found.values, found.low) == ({"tangent": 1.0}, {"gain": 2.0}, 0.0)

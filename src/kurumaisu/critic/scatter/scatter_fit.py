@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from operator import attrgetter
 
 import numpy as np
 
@@ -193,12 +192,10 @@ class ScatterFit:
         """Return how ill simulations with effects agree with what was measured [nat]."""
         return self.likeness.cost(self.statistics(settings, (1, 2)))
 
-    def rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
-        """Return the best of an effect's forms and some sizes, as if changes of the statistics were sums."""
+    def rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> list[RoughFit]:
+        """Return the best of some sizes of each of an effect's forms, as if changes of the statistics were sums."""
         forms = list({tuple(push.form.items()): push.form for push in pushes}.values())
-        return min(
-            (self._rough([push for push in pushes if push.form == form], at) for form in forms), key=attrgetter("low")
-        )
+        return [self._rough([push for push in pushes if push.form == form], at) for form in forms]
 
     def _rough(self, pushes: Sequence[StatisticsChange], at: FloatArray) -> RoughFit:
         """Return the best of some sizes of one form's parameters, and of sizes between them."""
@@ -220,7 +217,23 @@ class ScatterFit:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
         (piece,), low = self.together([ScatterPiece(start.effect, setting, tuple(start.values))], beside)
+        for p in start.effect.parameters if len(start.values) > 1 else ():
+            piece, low = self._spared(p, piece, low, beside)
         return self.shaped(piece, low, beside)
+
+    def _spared(
+        self, p: Parameter, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]
+    ) -> tuple[ScatterPiece, float]:
+        """Return an effect without one of several parameters where that fits nearly as well, and its misfit.
+
+        Changes of the statistics are no sums: what seemed to help may be needless when the others are fitted.
+        """
+        if p.name not in piece.free or len(piece.free) == 1:
+            return piece, low
+        setting = EffectSetting(piece.setting.id, {**piece.setting.parameters, p.name: p.null})
+        free = tuple(name for name in piece.free if name != p.name)
+        (plainer,), misfit = self.together([replace(piece, setting=setting, free=free)], beside)
+        return (plainer, misfit) if misfit < low + _least(p) else (piece, low)
 
     def shaped(self, piece: ScatterPiece, low: float, beside: Sequence[EffectSetting]) -> tuple[ScatterPiece, float]:
         """Return an effect with what shapes it fitted, too, as far as it helps, and its misfit; low: without that."""

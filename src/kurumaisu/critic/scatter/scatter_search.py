@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from operator import attrgetter
 
 import numpy as np
@@ -129,31 +130,34 @@ class ScatterSearch:
                     yield self._weighed([*others, shaped], misfit)
         if len(known.pieces) == _LARGEST:
             return
-        starts = sorted(self._starts(pushes, known), key=attrgetter("low"))[:_REFITS]
-        for start in starts:
+        starts = sorted(self._starts(pushes, known), key=lambda forms: forms[0].low)[:_REFITS]
+        for start in chain(*starts):
             gain = known.cost - start.low
-            if gain < max(_PROMISED, _CLOSE * (known.cost - starts[0].low)) or start.low > best.cost + _HOPELESS:
-                break
+            if gain < max(_PROMISED, _CLOSE * (known.cost - starts[0][0].low)) or start.low > best.cost + _HOPELESS:
+                continue
             piece, cost = self._fit.alone(start, known.settings)
             group = [*known.pieces, piece]
             if known.pieces:
                 group, cost = self._fit.together(group, ())
             yield self._weighed(group, cost)
 
-    def _starts(self, pushes: Sequence[StatisticsChange], known: _Fitted) -> Iterator[RoughFit]:
-        """Yield rough sizes of each other effect beside a set, or those that it was fitted with in another one."""
+    def _starts(self, pushes: Sequence[StatisticsChange], known: _Fitted) -> Iterator[list[RoughFit]]:
+        """Yield rough sizes of each form of each other effect beside a set, the best first.
+
+        Or those that it was fitted with in another set. A form may lack a shape yet, by which it is the better one.
+        """
         at, plain = (self._fit.statistics(settings, (1, 2)) for settings in (known.settings, ()))
         ranked = sorted(self._known.values(), key=_score)
         fitted = {piece.effect: piece for one in ranked for piece in one.pieces}  # as in the likeliest set
         for effect in self._fit.candidates(set(known.effects)):
             found = []
             if own := [push for push in pushes if push.effect is effect]:
-                found.append(self._fit.rough(own, at))
+                found += self._fit.rough(own, at)
             if piece := fitted.get(effect):
                 change = self._fit.statistics((piece.setting,), (1, 2)) - plain
                 found.append(piece.start(self._likeness.cost(at + change)))
             if found:
-                yield min(found, key=attrgetter("low"))
+                yield sorted(found, key=attrgetter("low"))
 
     def _weighed(self, pieces: Sequence[ScatterPiece], cost: float) -> _Fitted:
         """Return a fitted set with its evidence beside that of none; cost: its misfit [nat]."""
