@@ -9,6 +9,7 @@ from laser_scene import recording
 
 from kurumaisu import effects
 from kurumaisu.critic import pipeline
+from kurumaisu.critic.judge.scan_verdict import criticise_scans
 from kurumaisu.effects import Echoes
 from kurumaisu.errors import Error
 from kurumaisu.params import EffectSetting, load_model, shipped
@@ -56,6 +57,14 @@ def test_noise_that_follows_something_is_outside_the_catalogue(tmp_path, covaria
     knots = [value for name, value in curve.parameters.items() if name.startswith("knot")]
     quiet, loud = (factor(curve, **{covariate: knots[0] + share * (knots[-1] - knots[0])}) for share in (0.25, 0.9))
     assert loud / quiet > 1.3
+
+
+def test_noise_that_comes_and_goes_follows_the_time(tmp_path):
+    """Every seven seconds for two: a curve that bends every four sees none of it."""
+    data = shaken(recording(tmp_path, None, 0.0, 11, scans=100), lambda scan, beam: scan // 6 % 3 == 0, 1.0 * USUAL)
+    finding = criticise_scans(data, load_model(MD100), lambda _: None)
+    assert (finding.unknown[0].channel, finding.unknown[0].covariate) == ("laser.scatter", "time")
+    assert not finding.causes
 
 
 def test_a_curve_multiplies_the_noise_where_what_it_follows_is_known():
