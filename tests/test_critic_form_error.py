@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kurumaisu import effects, geometry
 from kurumaisu.bench.hidden.base import recordings
 from kurumaisu.bench.hidden.base.catalogue import BASE
 from kurumaisu.bench.hidden.generator.motion import Fault, Form
@@ -144,20 +143,6 @@ def test_a_zone_with_a_soft_corner_is_a_dead_zone_and_nothing_else(seed):
     assert found.named == ("base.dead_zone_w",)
     assert found.best.ids == {"base.dead_zone_w"}
     assert not found.confounded
-
-
-def test_a_mark_on_a_mount_that_gives_is_a_mark_beside_the_chair_and_nothing_else():
-    """What hangs on it moves as the chair turns: across where the mark's own turning takes it."""
-    problem = problem_of([], {"base.marker_y", effects.SMOOTH}, 2)
-
-    def seen(drive):
-        off = np.zeros_like(drive.poses)
-        off[:, 1] = 0.1 * (1 + 0.3 * np.sin(drive.poses[:, 2] + 1.0))
-        return drive.seen_at(drive.times, geometry.compose(drive.poses, off))
-
-    found = search.search(problem.changed(drives=[seen(drive) for drive in problem.drives]), lambda _: None)
-    assert found.named == ("base.marker_y",)
-    assert sum(found.p_curves.values()) < 0.5
 
 
 SOFT = {"base.saturation", "base.curvature_v"}  # a soft top speed bends the law, too
