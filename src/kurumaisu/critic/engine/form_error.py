@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from kurumaisu import effects, geometry
+from kurumaisu import effects
 from kurumaisu.critic.base.drive import GRID, Drive
 from kurumaisu.critic.engine.catalogue import Term, settings_of
 from kurumaisu.critic.engine.covariance import without
@@ -69,38 +69,11 @@ def _marks(problem: Problem, drive: Drive, terms: Sequence[Term], values: FloatA
     signal = here - problem.simulated(drive, settings_of(terms, np.where(own, null, values)))
     smooth = smooth_functions(drive)
     whole = [signal.reshape(-1, 1)]
-    place = _place(problem, settings_of(terms, values), name)
-    if place.any():
-        whole.append(_elsewhere(drive, place, smooth).reshape(signal.size, -1))
-    else:
-        for axes in ((True, True, False), (False, False, True)):
-            part = np.where(axes, signal, 0.0)
-            whole.append((part[:, :, None] * smooth[:, None, :]).reshape(signal.size, -1))
+    for axes in ((True, True, False), (False, False, True)):
+        part = np.where(axes, signal, 0.0)
+        whole.append((part[:, :, None] * smooth[:, None, :]).reshape(signal.size, -1))
     whole += [(problem.simulated(drive, other) - here).reshape(-1, 1) for other in _other_sizes(terms, values, name)]
     return problem.whitened(drive, np.concatenate(whole, axis=1))
-
-
-def _place(problem: Problem, settings: Settings, name: str) -> FloatArray:
-    """Return where on the robot an effect has the reference measure (3,); 0 of one that does not move it."""
-    effect, origin = effects.by_id(name), np.zeros((1, 3))
-    if issubclass(effect, effects.ReferenceEffect):
-        nulls = {p.name: p.null for p in effect.parameters}
-        own = next(setting.parameters for setting in settings if setting.id == name)
-        context = effects.Context(problem.model.translation, problem.model.steering, np.random.default_rng(0))
-        measures = effect({**nulls, **own}, context)
-        origin = measures.apply(effects.Reference(np.zeros(1), origin, origin)).poses
-    return np.asarray(origin[0])
-
-
-def _elsewhere(drive: Drive, place: FloatArray, smooth: FloatArray) -> FloatArray:
-    """Return by how much increments (m, 3, k) are off where a place (3,) on the robot is off by smooth shares of it.
-
-    A mount that gives moves what hangs on it, too: what is off at an increment's end was off otherwise at its start.
-    """
-    ends = np.pad(smooth, ((1, 1), (0, 0)), mode="edge")
-    off = 0.5 * (ends[1:] + ends[:-1])[:, :, None] * place  # (m + 1, k, 3)
-    gone = np.broadcast_to(drive.measured[:, None, :], off[1:].shape)
-    return np.asarray(np.moveaxis(geometry.between(off[:-1], geometry.compose(gone, off[1:])) - gone, 2, 1))
 
 
 def _other_sizes(terms: Sequence[Term], values: FloatArray, name: str) -> Iterator[Settings]:
