@@ -127,9 +127,9 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
         yield from _with_rest(question, assembly, normal, lead, evidence)
         return
     made, fit = settled(assembly, normal, made, fit, recording.truth)
+    mean = MeanFit(assembly, normal, made, fit)
     if recording.truth is not None:
-        likelihood = fit.assembly.noise_beside(fit.normal.beam_noise, made.fit.forms, fit.block)
-        beyond = beyond_stated(likelihood, recording.truth, fit.normal.scan_noise)
+        beyond = beyond_stated(mean.noise_likelihood, recording.truth, fit.normal.scan_noise)
         # What equations nearly right leave of what acts looks like a reference that wanders, too.
         if beyond > max(CERTAIN, FORM_ERROR * made.fit.log_likelihood):
             progress("laser: the reference errs by more than is said")
@@ -141,7 +141,7 @@ def _findings(question: _Question, *, posed: bool) -> Iterator[LaserFinding]:
         yield from _findings(question, posed=True)
         return
     yield _finding(assembly, normal, made, fit, Scatter([], [], ()))
-    yield _with_scatter(question, MeanFit(assembly, normal, made, fit))
+    yield _with_scatter(question, mean)
 
 
 def _too_few(assembly: Assembly, normal: NormalEquations) -> str:

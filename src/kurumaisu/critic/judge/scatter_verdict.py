@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from kurumaisu import effects
 from kurumaisu.critic.heldout.materiality import MATERIAL
-from kurumaisu.critic.ranges.noise.scan_noise import common_mode
+from kurumaisu.critic.ranges.noise.scan_noise import NoiseLikelihood, common_mode
 from kurumaisu.critic.ranges.scans.beams import Shots, hits_of, with_own
 from kurumaisu.critic.ranges.scans.valid_readings import usable_beams
 from kurumaisu.critic.ranges.search import block_evidence
@@ -42,6 +43,11 @@ class MeanFit:
     made: MeanEffects
     fit: ParameterFit
 
+    @cached_property
+    def noise_likelihood(self) -> NoiseLikelihood:
+        """How likely the noise of scans is beside all that acts."""
+        return self.fit.assembly.noise_beside(self.fit.normal.beam_noise, self.made.fit.forms, self.fit.block)
+
 
 @dataclass(frozen=True)
 class Scatter:
@@ -68,8 +74,7 @@ def scatter_effects(mean: MeanFit, recording: Recording, ids: frozenset[str] | N
     found = _of_readings(assembly, fit, ids, strange=made.curve, away=away)
     if made.curve:
         return found
-    likelihood = fit.assembly.noise_beside(fit.normal.beam_noise, made.fit.forms, fit.block)
-    seen = common_mode(likelihood, recording.truth, fit.normal.scan_noise, own)
+    seen = common_mode(mean.noise_likelihood, recording.truth, fit.normal.scan_noise, own)
     seen = replace(seen, wary=fit.normal.wary)
     scatter = with_common_offset(found.effects, seen, fit.normal.scan_noise, recording, ids)
     scatter = beyond_own_offset(scatter, FORM_ERROR * _spread_of(assembly, mean.normal, made), own)

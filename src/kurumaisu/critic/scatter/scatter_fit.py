@@ -217,7 +217,7 @@ class ScatterFit:
         """Return an effect fitted beside others, and its misfit: the parameters that helped; then its shape."""
         setting = EffectSetting(start.effect.id, {**self._simulate.null(start.effect), **start.form, **start.values})
         (piece,), low = self.together([ScatterPiece(start.effect, setting, tuple(start.values))], beside)
-        for p in start.effect.parameters if len(start.values) > 1 else ():
+        for p in start.effect.parameters:
             piece, low = self._spared(p, piece, low, beside)
         return self.shaped(piece, low, beside)
 
