@@ -77,7 +77,7 @@ def test_the_lead_is_that_over_the_best_of_the_catalogue(found_of):
 def decided(recording, *ids):
     """Return what is decided of drives whose noise nobody knows."""
     problem = hidden.problem_of(recording, frozenset(ids)).changed(noise=START)
-    return decide.decide(problem, TRUTH, lambda _: None)
+    return decide.decide(problem, search(problem, lambda _: None), TRUTH, lambda _: None)
 
 
 GAINS = "base.gain_v", "base.gain_w"
@@ -131,7 +131,7 @@ def test_slow_noise_takes_up_an_offset_until_it_is_looked_for_without():
     hint = decide._hinted(problem, found, lambda _: None)
     assert hint is not None
     assert hint.found.best.ids == {"base.dac_zero_f"}
-    made = decide.decide(problem, None, lambda _: None)
+    made = decide.decide(problem, found, None, lambda _: None)
     assert made.found.best.ids == {"base.dac_zero_f"}
     (setting,) = made.found.best.settings
     assert setting.parameters["rests"] == -1.0
@@ -145,3 +145,17 @@ def test_quick_noise_is_as_loud_within_a_second_and_lasts_no_longer():
     assert quick.sd_w**2 / quick.tau == pytest.approx(noise.sd_w**2 / noise.tau)  # how fast it begins to change
     assert quick.slow_v == noise.slow_v
     assert (noise.slowest, quick.slowest, replace(noise, slow_v=0.0, tau=0.2).slowest) == (16.0, 1.0, 0.2)
+
+
+def test_a_search_ends_where_ever_more_sets_would_be_fitted(monkeypatch):
+    """Two gains act. Both are found, unless no more than what acts by itself may be fitted."""
+    both = Fault(Form("rates", lambda r, _: replace(r, v=1.15 * r.v, w=1.15 * r.w)), {})
+    drawn = recordings.draw_drives("rich", USUAL, np.random.default_rng(6), seconds=40.0, rate=10.0)
+    runs = recordings.recording("gains", drawn, [both]).runs
+    problem = Problem([prepare(run, MODEL) for run in runs], MODEL, START, ids=frozenset(GAINS))
+    assert search(problem, lambda _: None).best.ids == set(GAINS)
+    monkeypatch.setattr("kurumaisu.critic.search.search._MOST", 2)
+    monkeypatch.setattr("kurumaisu.critic.search.search.nearly_same_rates", lambda *_: True)  # no second look
+    fitted = []
+    assert len(search(problem, fitted.append).best.ids) == 1
+    assert len(fitted) == 3

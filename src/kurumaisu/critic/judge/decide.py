@@ -80,13 +80,12 @@ class Hint:
     curve: SetWithCurve | None
 
 
-def decide(first: Problem, truth: Truth, progress: Progress) -> Decision:
-    """Return what acts in drives of which only a first noise is known.
+def decide(first: Problem, found: SearchResult, truth: Truth, progress: Progress) -> Decision:
+    """Return what acts in drives of which only a first noise is known; found: what seems to act in that.
 
     Noise that was estimated without a curve has taken it up. So where one may act, all is judged with the noise about
     it, too, and the likelier one holds, each heard with its own noise.
     """
-    found = search.search(first, progress)
     curve = likelier_curve(found)
     made = _settled(first, found, curve, _noise_about(first, found, curve, truth, progress), truth, progress)
     other = _hinted(first, found, progress) if made.extension is None and found.enough else None

@@ -25,6 +25,7 @@ from kurumaisu.critic.noise import base_noise
 from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.sanity import early_stamps
+from kurumaisu.critic.search import search
 from kurumaisu.critic.values.criticism import Criticism, Progress, Settings
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry, of_turning
@@ -52,7 +53,8 @@ def criticise_drives(
         ids = beside_odometry(ids)
     ids = ids if recording.placed else of_turning(ids)
     rough, first = _begun(recording, model, drives, ids)
-    by = early_stamps.lead(first, progress)
+    found = search.search(first, progress)
+    by = early_stamps.lead(first, found, progress)
     # Of two sensors neither asks the other for anything, so that one may be late.
     sensors = recording.turning and all(drive.source == "odom" for drive in first.drives)
     if by > early_stamps.tolerated_lead([run for run in recording.runs if run.name in drives]) and not sensors:
@@ -61,16 +63,17 @@ def criticise_drives(
         recording = replace(recording, problems=(*recording.problems, early_stamps.note(by, imu=sensors)))
         drives = {name: [early_stamps.restamped(drive, by) for drive in some] for name, some in drives.items()}
         rough, first = _begun(recording, model, drives, ids)
+        found = search.search(first, progress)
     train = list(first.drives)
     test = [drive for name in recording.test for drive in drives.get(name, [])]
-    made = decide(first, recording.truth, progress)
+    made = decide(first, found, recording.truth, progress)
     # Where only turning was measured, places say what was asked for, in which nothing comes and goes.
     made, going = unresolved.certain_intermittent(made, [*train, *test]) if recording.placed else (made, None)
     if going is not None:
         progress("judging what is left without the moments in which something comes and goes")
         train, test = [going.freed(drive) for drive in train], [going.freed(drive) for drive in test]
         rough, first = rough.changed(drives=tuple(train)), first.changed(drives=tuple(train))
-        made = decide(first, recording.truth, progress)
+        made = decide(first, search.search(first, progress), recording.truth, progress)
         # What is left of such moments grows with the rates as well: of the noise that says nothing.
         made = replace(made, growth=replace(made.growth, p=0.0))
 
@@ -87,8 +90,8 @@ def criticise_drives(
     shares = explain.shares_of(made, turning=recording.turning)
     judged = unresolved.with_remainder(unresolved.with_unresolved(judged, made, held, shares, test))
     judged = unresolved.with_intermittent(judged, going)
-    found = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
-    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=found)
+    measured = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
+    taken = RobotTaken(model.robot.kind, assumed=False, multipliers=measured)
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     extension = _extension(made, forecast_of(made, judged.settings, baseline), train)
     return judged, replace(extension, points=_points(made, judged.verdict.confounded))

@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from kurumaisu.critic.base.drive import Drive
 from kurumaisu.critic.engine.evidence import Problem, log_posterior
 from kurumaisu.critic.search import search
+from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import Progress
 from kurumaisu.critic.values.recording import Run
 from kurumaisu.types import FloatArray
@@ -27,8 +28,11 @@ _PAUSE = 0.1  # [s] rows further apart than this are written when something chan
 _LEAST = 2e-3  # [s] less is the rounding of stamps
 
 
-def lead(problem: Problem, progress: Progress) -> float:
-    """Return by how much the motion comes before what asks for it [s], 0 where a chair may do what is seen."""
+def lead(problem: Problem, found: SearchResult, progress: Progress) -> float:
+    """Return by how much the motion comes before what asks for it [s], 0 where a chair may do what is seen.
+
+    found: what acts if no clock is wrong.
+    """
     alone = _cost(problem, 0.0)
     cost, tried = min((_cost(problem, by), by) for by in _TRIED)
     if alone - cost < _HOPE:
@@ -38,7 +42,7 @@ def lead(problem: Problem, progress: Progress) -> float:
     by = float(best.x)
     if by < _LEAST:
         return 0.0
-    found, other = search.search(problem, progress), search.search(_later(problem, by), progress)
+    other = search.search(_later(problem, by), progress)
     won = log_posterior(other.best, len(other.p)) - log_posterior(found.best, len(found.p))
     return by if won > _WIN else 0.0
 

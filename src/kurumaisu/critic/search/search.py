@@ -37,6 +37,7 @@ _SWAPPED = 4  # and in the place of each of its effects
 _ASKED = 20.0  # [nat] behind the best set from which on no curve is asked for beside one
 _HOPELESS = 10.0  # [nat] that a proposal may promise less than the best set has
 _ROUNDS = 8
+_MOST = 80  # sets fitted in these, after which no more is gone on from: where nothing explains all, many come near
 _CLOSER = 4  # sets beside which curves of other kinds are tried
 _LARGEST = 6  # effects in a set
 _STEP_COST = 4.0  # [nat] of a size that may be any of many
@@ -246,6 +247,7 @@ class _Search:
                     self.curves.closer(rest)
 
     def _go_on(self) -> None:
+        until = len(self.fits) + _MOST
         for _ in range(self._rounds):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
@@ -256,7 +258,7 @@ class _Search:
             if not ahead:
                 break
             for fit in ahead:
-                if fit.candidates not in self._done:
+                if fit.candidates not in self._done and len(self.fits) < until:
                     self._done.add(fit.candidates)
                     self._expand(fit)
 
