@@ -15,7 +15,7 @@ from kurumaisu.critic.judge import explain
 from kurumaisu.critic.ranges.scans.repeatability import repeatability
 from kurumaisu.critic.values.criticism import UNRESOLVED
 from kurumaisu.errors import Error
-from kurumaisu.real import by_hand, mines, sena, urg_log, warthog
+from kurumaisu.real import by_hand, create, lego, mines, sena, urg_log, warthog
 from kurumaisu.real.__main__ import main
 
 DATA = Path(__file__).resolve().parents[2] / "shared/data"
@@ -63,6 +63,36 @@ def test_wheels_are_measured_though_poses_come_rarely_on_a_winding_way():
     radius, track, _ = warthog.wheels_against_ground(dataclasses.replace(log, pose=poses[kept]), 0.0, 90.0)
     assert radius == pytest.approx(0.28, rel=1e-3)
     assert track == pytest.approx(1.8, rel=1e-3)
+
+
+def test_a_robot_that_starts_slowly_and_falls_short_in_bends_is_measured_by_hand():
+    """Every 6 s it drives for 3 s: ahead, or in bends to the left; it stops sooner than it starts."""
+    t = np.arange(0.0, 60.0, 0.05)
+    drives, bends = (t + 1e-9) % 6 > 3, (t + 1e-9) % 12 > 6
+    asked = np.column_stack([0.07 * drives, 0.4 * (drives & bends)])
+    since = (t + 1e-9) % 3
+    rising, falling = np.clip((since - 0.2) / 0.4, 0.0, 1.0), 1.0 - np.clip((since - 0.1) / 0.1, 0.0, 1.0)
+    v = np.where(drives, rising, np.where(t < 3, 0.0, falling)) * np.where(drives & bends, 0.6, 1.0) * 0.07
+    said = "\n".join(create.by_hand(create.Log(t, asked, np.column_stack([v, 0.97 * asked[:, 1]]))))
+    assert "starts: a tenth, half, nine tenths after 0.24, 0.40, 0.56 s" in said
+    assert "stops: a tenth, half, nine tenths after 0.11, 0.15, 0.19 s" in said
+    assert "v straight ahead: 1.000 +- 0.000 of a usual 0.070, 5 steady stretches" in said
+    assert "v in bends: 0.600" in said
+    assert "w to the left: 0.970" in said
+    assert "to the right" not in said
+
+
+def test_the_create_is_slow_to_start_and_falls_short_in_bends():
+    said = "\n".join(create.by_hand(create.load(needs(DATA.parent / "strangers/real/create_r3"))))
+    assert "v in bends: 0.58" in said
+    assert "w to the left: 0.97" in said
+
+
+def test_the_lego_robot_goes_further_and_turns_less_than_its_ticks_say():
+    line = lego.path_fit(needs(DATA.parent / "strangers/real/lego_camera"), 0.0, 1.0)
+    assert line.at[0] == pytest.approx(1.067, abs=0.005)
+    assert line.at[1] == pytest.approx(0.898, abs=0.01)
+    assert line.rms < 0.02
 
 
 def test_a_tick_of_the_mines_rover_is_what_its_speed_says():

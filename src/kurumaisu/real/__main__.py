@@ -17,6 +17,8 @@ from kurumaisu.errors import Error, failed
 NAMES = {
     "warthog": "Clearpath Warthog on asphalt: wheel to ground",
     "warthog_command": "the same: command to wheel",
+    "create": "two iRobot Create: commands and motion capture",
+    "lego": "LEGO robot: odometry against a camera, and against scans",
     "mines": "rover of Mines ParisTech: ticks and scans",
     "urg": "URG-04LX on a bench, byte by byte",
     "handheld": "URG-04LX carried by hand",

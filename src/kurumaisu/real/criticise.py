@@ -15,6 +15,7 @@ from kurumaisu.critic.data.clean import Faults
 from kurumaisu.critic.data.csv_reader import write_csv_run
 from kurumaisu.critic.values.verdict import Verdict
 from kurumaisu.errors import Error
+from kurumaisu.params import Robot
 from kurumaisu.types import FloatArray
 from kurumaisu.whole_files import write_whole
 
@@ -30,11 +31,14 @@ def recording(folder: Path, runs: Mapping[str, Mapping[str, FloatArray]], **meta
     return folder
 
 
-def criticise(path: Path, output: Path, title: str) -> Verdict | None:
-    """Print what the critic says of a recording under a title, and return it; None where it refuses, which is said."""
+def criticise(path: Path, output: Path, title: str, robot: Robot | None = None) -> Verdict | None:
+    """Print what the critic says of a recording under a title, and return it; None where it refuses, which is said.
+
+    robot: which it is, None: as the recording says.
+    """
     print(f"\n## The critic: {title}")
     try:
-        return cli.tell(Job(path, output / "criticism"))
+        return cli.tell(Job(path, output / "criticism", robot=robot))
     except Error as error:
         print(f"refused: {error}")
         return None
@@ -45,3 +49,9 @@ def there(path: Path) -> Path:
     if not path.exists():
         raise Error(f"{path}: is not there; docs/critic/real_data.md says where it is from")
     return path
+
+
+def strangers(data: Path, name: str) -> Path:
+    """Return the folder of a table that came as a recording already. Raise Error where it is not there."""
+    beside = data.parent / "strangers/real" / name
+    return beside if beside.exists() else there(data / name)
