@@ -48,12 +48,12 @@ def simulates_nearer(gain: Gain | None, channels: Sequence[str]) -> bool:
     """Return whether drives held out are simulated nearer to what was measured in one of some channels, in none less.
 
     What a curve or an equation leaves of something strong is no normal noise: a few surprises may cost all that the
-    density gains. Where they cost so much for sure, the chair must also come nearer to where it came.
+    density gains. Where they cost more, the chair must also come nearer to where it came.
     """
     if gain is None:
         return False
     path = next(iter(gain.rmse.values()), None)  # over the shortest horizon
-    if gain.log_density_per_sample.hi90 < 0 and path is not None and path.gain < 0:
+    if gain.log_density_per_sample.gain < 0 and path is not None and path.gain < 0:
         return False
     errors = [gain.channels[name].rmse for name in channels if name in gain.channels]
     known = [error for error in errors if error is not None]
