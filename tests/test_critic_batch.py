@@ -211,6 +211,15 @@ def test_a_log_gets_a_line_for_each_that_ends_and_no_codes():
     assert stream.getvalue() == "critic: 1 of 2: a: error (12 s)\n"
 
 
+def test_a_log_is_not_flooded_by_steps_of_one_kind(monkeypatch):
+    monkeypatch.setattr("time.monotonic", iter([100.0, 101.0, 109.0, 112.0, 112.5]).__next__)
+    stream = io.StringIO()
+    shown = Plain(stream, 1)
+    for message in ("fitting a", "fitting b", "estimating", "fitting c", "fitting d"):
+        shown.tell("x", message)
+    assert stream.getvalue().split("critic: ")[1:] == ["fitting a\n", "estimating\n", "fitting c\n"]
+
+
 def test_no_scheduler_is_named(many, tmp_path, monkeypatch):
     pytest.importorskip("distributed", reason="Dask is not installed: --dask is not tested")
     monkeypatch.setattr(batch, "_HELLO", 0.5)

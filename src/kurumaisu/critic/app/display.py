@@ -15,6 +15,7 @@ from kurumaisu.critic.values.digits import NBSP
 _BAR = 24  # characters
 _SHORTEST_BAR = 5  # characters; of less there is nothing to be seen
 _REDRAW = 0.05  # [s] at least between two pictures
+_AGAIN = 10.0  # [s] at least between two lines of a log that begin with the same word, such as fits of one search
 
 
 def printable(text: str) -> str:
@@ -76,16 +77,19 @@ class Display:
 
 
 class Plain(Display):
-    """Lines that stay, for a log: each step of a single recording, each end of many."""
+    """Lines that stay, for a log: each kind of step of a single recording, each end of many."""
 
     def __init__(self, stream: TextIO, total: int) -> None:
         self._stream = stream
         self._total = total
         self._done = 0
+        self._kind, self._said = "", 0.0
 
     def tell(self, name: str, message: str) -> None:
-        """Say the step."""
-        if self._total == 1:
+        """Say the step; of hundreds of one kind one in a while."""
+        kind, now = message.partition(" ")[0], time.monotonic()
+        if self._total == 1 and (kind != self._kind or now - self._said > _AGAIN):
+            self._kind, self._said = kind, now
             print(f"critic: {printable(message)}", file=self._stream, flush=True)
 
     def end(self, outcome: Outcome) -> None:
