@@ -212,15 +212,16 @@ def _pytests(tree: Inputs, quick: bool) -> list[Check]:
     )
     wait = [path for path in paths if inputs.waits(path)]
 
-    def check(name: str, some: Iterable[Path], **more: Any) -> Check:
+    def check(name: str, some: Iterable[Path], *options: str, **more: Any) -> Check:
         output = _folder(name) / "pytest.xml"
         command = ["env", "OPENBLAS_NUM_THREADS=1", "python", "-m", "pytest", "-n", "auto", "--dist", "loadfile"]
-        command += [f"--junit-xml={output}", *(["--quick"] if quick else [])]
+        command += [f"--junit-xml={output}", *(["--quick"] if quick else []), *options]
         parts = tuple(Part(path.stem, partial(tree.of_pytest, path), path, quick) for path in some)
         return Check(name, command, parts, tests=True, **more)
 
     sums = check("pytest sums", (path for path in paths if path not in wait), after=BUILD_TESTS, beside=not quick)
-    return [sums, check("pytest", wait, after=BUILD_TESTS, quick=False, clock=True)]
+    hangs = "--timeout=300"  # [s] for each, where the longest takes some 70: says which hangs and where, and goes on
+    return [sums, check("pytest", wait, hangs, after=BUILD_TESTS, quick=False, clock=True)]
 
 
 def _run(check: Check, stop: Event) -> Counts:
