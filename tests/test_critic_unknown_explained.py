@@ -8,7 +8,7 @@ import unknown_effects as hidden
 
 from kurumaisu.critic import pipeline
 from kurumaisu.critic.heldout.materiality import simulates_nearer
-from kurumaisu.critic.judge import explain_unknown
+from kurumaisu.critic.judge import explain_unknown, multipliers
 from kurumaisu.critic.search.curve_search import CurveSearch
 from kurumaisu.critic.search.posterior import SearchResult
 from kurumaisu.critic.values.criticism import UNRESOLVED
@@ -64,11 +64,17 @@ def test_a_curve_that_is_another_form_of_an_effect_is_told_as_no_unknown():
     [(50.0, False, "Held-out data do not confirm this: it is not"), (1e9, True, "Something is wrong")],
 )
 def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, least, unresolved, said):
-    """Nothing is extended by what did not hold, and no curve is certain; without one it is still not green."""
+    """Nothing is extended by what did not hold, and no curve is certain; without one it is still not green.
+
+    Nobody measured the path either, so that no numbers are offered for a controller.
+    """
     recording = hidden.make(hidden.KINDS["carpet edge"], 30.0, 1003, seconds=30.0, runs=2).recording
+    recording = replace(recording, runs=tuple(replace(run, pose_source="the odometry") for run in recording.runs))
     monkeypatch.setattr(explain_unknown, "confirmed", lambda worth, nats, free: False)
     monkeypatch.setattr(explain_unknown, "simulates_nearer", lambda worth, channels: False)
     monkeypatch.setattr(explain_unknown, "NO_NOISE", least)
+    asked = list[object]()
+    monkeypatch.setattr(multipliers, "measured", lambda *of, **_: asked.append(of))
     ids = frozenset({"base.gain_w", "base.veer", "smooth"})
     found = pipeline.criticise(recording, shipped("launch/md100.yaml"), lambda _: None, ids=ids)
     assert (found.verdict.verdict, found.verdict.causes) == ("unknown", ())
@@ -76,3 +82,4 @@ def test_what_cannot_be_noise_is_unknown_though_no_curve_holds(monkeypatch, leas
     assert all(one.p <= 0.5 for one in found.verdict.unknown)
     assert (found.verdict.unknown[0].covariate == UNRESOLVED) is unresolved
     assert said in found.story.headline
+    assert bool(asked) is not unresolved

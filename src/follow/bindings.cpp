@@ -3,6 +3,7 @@
 #include "bindings.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "follow/follow.h"
@@ -29,6 +30,14 @@ py::tuple ramp(const Array& targets, double slowness, double dt, double level) {
   return py::make_tuple(means, it.level());
 }
 
+py::tuple lag(const Array& targets, double tau, double dt, double level) {
+  if (!(tau > 0) || !(dt > 0)) throw std::invalid_argument("tau and dt must be positive");
+  const double decay = std::exp(-dt / tau);
+  Lag it(decay, tau / dt * (1 - decay), level);
+  const Array means = along(targets, [&](double target) { return it.step(target); });
+  return py::make_tuple(means, it.level());
+}
+
 py::tuple play(const Array& inputs, double half, double level) {
   if (!(half >= 0)) throw std::invalid_argument("half must not be negative");
   Play it(half, level);
@@ -43,6 +52,9 @@ void bindFollow(py::module_& m) {
         "Means (n,) over steps of dt [s] of an output that runs after targets (n,), at most 1 / slowness per "
         "second,\n"
         "from a level on; and the level reached.");
+  m.def("lag", &lag, py::arg("targets"), py::arg("tau"), py::arg("dt"), py::arg("level"),
+        "Means (n,) over steps of dt [s] of a first-order lag of tau [s] behind targets (n,), from a level on; and\n"
+        "the level reached.");
   m.def(
       "play", &play, py::arg("inputs"), py::arg("half"), py::arg("level"),
       "Outputs (n,) that inputs (n,) drag along, each never more than half from its input, from a level on; "

@@ -21,6 +21,27 @@ class Ramp {
   double level_;
 };
 
+/// First-order lag, exact for targets held over a step.
+class Lag {
+ public:
+  /// decay: share of a difference that is left after a step; mean: share of it that there is in the step on the mean.
+  Lag(double decay, double mean, double level) : decay_(decay), mean_(mean), level_(level) {}
+
+  /// Mean of the output over a step with this target.
+  double step(double target) {
+    const double out = target + (level_ - target) * mean_;
+    level_ = (1 - decay_) * target + decay_ * level_;
+    return out;
+  }
+
+  double level() const { return level_; }
+
+ private:
+  double decay_;
+  double mean_;
+  double level_;
+};
+
 /// Output that its input drags along by play: it stays where it is until the input is half the play away.
 class Play {
  public:

@@ -273,6 +273,7 @@ __all__ = [
     "BeamEffect",
     "Beams",
     "Chain",
+    "ClockScale",
     "Context",
     "Echoes",
     "Effect",

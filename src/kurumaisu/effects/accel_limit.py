@@ -72,12 +72,16 @@ def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -
     late = motion.known.get(LATE)
     if late is None or slowness == 0:
         return _core.ramp(target, slowness, motion.dt, level)
-    late = np.minimum(late, _LATEST)
-    before = np.concatenate([[level], target[:-1]])
-    change = (target - before) / (1 - late)
+    at = np.flatnonzero(late)
+    late = np.minimum(late[at], _LATEST)
+    before = np.where(at > 0, target[at - 1], level)
+    change = (target[at] - before) / (1 - late)
     reach = (1 - late) * motion.dt / slowness
-    begun = np.where(late > 0, before + np.clip(change, -reach, reach), target)
+    begun = target.copy()
+    begun[at] = before + np.clip(change, -reach, reach)
     rates, end = _core.ramp(begun, slowness, motion.dt, level)
     # One that was still on its way goes on meanwhile.
-    waiting = np.abs(np.concatenate([[level], rates[:-1]]) - before) <= _REACHED * np.abs(begun - before)
-    return np.asarray(rates - np.where(waiting, late * (begun - before), 0.0)), end
+    gone = begun[at] - before
+    waiting = np.abs(np.where(at > 0, rates[at - 1], level) - before) <= _REACHED * np.abs(gone)
+    rates[at] -= np.where(waiting, late * gone, 0.0)
+    return rates, end

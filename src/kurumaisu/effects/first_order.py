@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """A first-order lag, which more than one effect has."""
 
-import numpy as np
-
+from kurumaisu import _core
 from kurumaisu.types import FloatArray
 
 
@@ -15,13 +14,8 @@ class FirstOrder:
 
     def follow(self, target: FloatArray, dt: float, tau: float) -> FloatArray:
         """Return the mean rates (n,) over steps of dt [s] for targets (n,); tau [s]."""
-        if tau < 1e-6:  # [s]; no lag, and the limit below would divide by it
+        if tau < 1e-6:  # [s]; no lag, the step is much longer
             self.level = float(target[-1])
             return target
-        decay = np.exp(-dt / tau)
-        from scipy.signal import lfilter  # half a second to load, for those who have no lag or noise
-
-        ends = lfilter([1 - decay], [1, -decay], target, zi=[decay * self.level])[0]
-        starts = np.concatenate([[self.level], ends[:-1]])
-        self.level = float(ends[-1])
-        return np.asarray(target + (starts - target) * (tau / dt) * (1 - decay))
+        rates, self.level = _core.lag(target, tau, dt, self.level)
+        return rates

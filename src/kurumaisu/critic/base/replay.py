@@ -139,12 +139,15 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     # A clock that runs fast is right at the start, of the drive or of the first one.
     started = drive.known.get(effects.RECORDING_TIME)
     start = 0.0 if started is None else float(started[0])
-    times = start + GRID * np.arange(len(poses))
     curved = any(isinstance(effect, effects.SmoothReference) for effect in chair.effects.reference)
     known = {**motion.known, "v": motion.v, "w": motion.w} if curved else {}
     known = {name: edges_of(values) for name, values in known.items()}
-    measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
-    return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
+    if any(isinstance(effect, effects.ClockScale) for effect in chair.effects.reference):
+        times = start + GRID * np.arange(len(poses))
+        measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
+        return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)
+    at, known = drive.at_poses(poses), {name: drive.at_poses(values) for name, values in known.items()}
+    return chair.seen(effects.Reference(start + (drive.times - drive.start), at, np.zeros_like(at), start, known)).poses
 
 
 def _driven(drive: Drive, model: Model, settings: Sequence[EffectSetting]) -> tuple[plant.Plant, effects.Motion]:

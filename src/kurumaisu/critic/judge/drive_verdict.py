@@ -26,7 +26,7 @@ from kurumaisu.critic.noise.base_noise import Noise
 from kurumaisu.critic.predict.motion import Forecast
 from kurumaisu.critic.sanity import early_stamps
 from kurumaisu.critic.search import search
-from kurumaisu.critic.values.criticism import Criticism, Progress, Settings
+from kurumaisu.critic.values.criticism import UNRESOLVED, Criticism, Progress, Settings
 from kurumaisu.critic.values.recording import Recording, Run
 from kurumaisu.critic.values.selection import beside_odometry, of_turning
 from kurumaisu.critic.values.verdict import Cause, Gain, NextExperiment, RobotTaken
@@ -90,7 +90,11 @@ def criticise_drives(
     shares = explain.shares_of(made, turning=recording.turning)
     judged = unresolved.with_remainder(unresolved.with_unresolved(judged, made, held, shares, test))
     judged = unresolved.with_intermittent(judged, going)
-    measured = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
+    measured = None
+    # What nobody measured may be what is wrong where nothing explains it: nobody should paste numbers from that.
+    checked = recording.turning or all(run.pose_source == "measured" for run in recording.runs)
+    if checked or all(one.covariate != UNRESOLVED for one in judged.verdict.unknown):
+        measured = multipliers.measured(made.problem, made.found.best, turning=recording.turning)
     taken = RobotTaken(model.robot.kind, assumed=False, multipliers=measured)
     judged = replace(judged, verdict=replace(judged.verdict, robot=taken))
     extension = _extension(made, forecast_of(made, judged.settings, baseline), train)

@@ -7,6 +7,7 @@ what two causes do together is no sum: the sets that they propose are fitted by 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -200,6 +201,7 @@ class _Search:
         self.curves = CurveSearch(problem)
         self._dictionary = Dictionary(problem)
         self._done: set[EffectSet] = set()
+        self._began, self._until = time.monotonic(), _MOST
 
     def bare(self, fit: Fit) -> float:
         """Return the log posterior of a set without a curve."""
@@ -221,9 +223,16 @@ class _Search:
         if len(set(ids)) < len(ids) or len(ids) > _LARGEST:
             return None
         if chosen not in self.fits:
-            self._progress(f"fitting {', '.join(sorted(ids)) or 'nothing'}")
+            self._say(", ".join(sorted(ids)) or "nothing")
             self.fits[chosen] = self.problem.fit_candidates(chosen, start)
         return self.fits[chosen]
+
+    def _say(self, what: str) -> None:
+        done = len(self.fits)
+        most = max(self._until, done + 1)
+        left = (most - done) * (time.monotonic() - self._began) / max(done, 1)
+        more = f", {left:.0f} s more at most" if done >= _FIRST else ""
+        self._progress(f"fitting set {done + 1} of {most} at most{more}: {what}")
 
     def run(self, first: Sequence[Fit]) -> None:
         """Go on from the best sets until none of them proposes anything."""
@@ -247,7 +256,7 @@ class _Search:
                     self.curves.closer(rest)
 
     def _go_on(self) -> None:
-        until = len(self.fits) + _MOST
+        self._until = len(self.fits) + _MOST
         for _ in range(self._rounds):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
@@ -258,7 +267,7 @@ class _Search:
             if not ahead:
                 break
             for fit in ahead:
-                if fit.candidates not in self._done and len(self.fits) < until:
+                if fit.candidates not in self._done and len(self.fits) < self._until:
                     self._done.add(fit.candidates)
                     self._expand(fit)
 
