@@ -273,7 +273,6 @@ __all__ = [
     "BeamEffect",
     "Beams",
     "Chain",
-    "ClockScale",
     "Context",
     "Echoes",
     "Effect",

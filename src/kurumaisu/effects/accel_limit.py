@@ -9,7 +9,7 @@ import numpy as np
 from kurumaisu import _core
 from kurumaisu.effects.base import LATE, Context, Effect, Follows, Motion, Parameter, Rate, Stage
 from kurumaisu.effects.first_order import FirstOrder
-from kurumaisu.types import FloatArray
+from kurumaisu.types import FloatArray, IntArray
 
 _LATEST = 0.98  # of a step: what is left then tells little of the new target
 _REACHED = 0.01  # share of a change by which a ramp may be off the old target, to have reached it
@@ -48,8 +48,11 @@ class AccelLimit(Effect):
     def apply(self, motion: Motion) -> Motion:
         """Ramp v and w; a sample is the step's mean rate."""
         slow_v, slow_w = self.values["slowness_v"], self.values["slowness_w"]
-        v, self._v = _ramped(motion, motion.v, slow_v, self._v)
-        w, self._w = _ramped(motion, motion.w, slow_w, self._w)
+        late = motion.known.get(LATE, np.empty(0))
+        at = np.flatnonzero(late)
+        late = np.minimum(late[at], _LATEST)
+        v, self._v = _ramped(motion.v, slow_v, motion.dt, self._v, at, late)
+        w, self._w = _ramped(motion.w, slow_w, motion.dt, self._w, at, late)
         share = self.values["round"]
         v, w = (
             lag.follow(rate, motion.dt, share * slowness)
@@ -63,23 +66,22 @@ class AccelLimit(Effect):
         self._lags[0].level, self._lags[1].level = self._v, self._w
 
 
-def _ramped(motion: Motion, target: FloatArray, slowness: float, level: float) -> tuple[FloatArray, float]:
-    """Return the mean rates (n,) of the steps, and the last step's at its end.
+def _ramped(
+    target: FloatArray, slowness: float, dt: float, level: float, at: IntArray, late: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the mean rates (n,) of the steps, and the last step's at its end; late (k,): shares of steps at (k,).
 
     Where a target changed within a step, a ramp goes as far as it can in what is left of it, and begins no sooner:
     one from the step's beginning would be early, and a delay seem to act.
     """
-    late = motion.known.get(LATE)
-    if late is None or slowness == 0:
-        return _core.ramp(target, slowness, motion.dt, level)
-    at = np.flatnonzero(late)
-    late = np.minimum(late[at], _LATEST)
+    if len(at) == 0 or slowness == 0:
+        return _core.ramp(target, slowness, dt, level)
     before = np.where(at > 0, target[at - 1], level)
     change = (target[at] - before) / (1 - late)
-    reach = (1 - late) * motion.dt / slowness
+    reach = (1 - late) * dt / slowness
     begun = target.copy()
     begun[at] = before + np.clip(change, -reach, reach)
-    rates, end = _core.ramp(begun, slowness, motion.dt, level)
+    rates, end = _core.ramp(begun, slowness, dt, level)
     # One that was still on its way goes on meanwhile.
     gone = begun[at] - before
     waiting = np.abs(np.where(at > 0, rates[at - 1], level) - before) <= _REACHED * np.abs(gone)

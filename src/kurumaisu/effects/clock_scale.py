@@ -22,6 +22,7 @@ class ClockScale(ReferenceEffect):
     source = "assumed: computers without a common clock; 0.01-0.5 %"
     shows_in = Rate.V
     follows = Follows.V_CHANGE
+    of_times = True
 
     def apply(self, reference: Reference) -> Reference:
         """Stretch the times."""

@@ -142,7 +142,7 @@ def measured_poses(drive: Drive, model: Model, settings: Sequence[EffectSetting]
     curved = any(isinstance(effect, effects.SmoothReference) for effect in chair.effects.reference)
     known = {**motion.known, "v": motion.v, "w": motion.w} if curved else {}
     known = {name: edges_of(values) for name, values in known.items()}
-    if any(isinstance(effect, effects.ClockScale) for effect in chair.effects.reference):
+    if any(effect.of_times for effect in chair.effects.reference):
         times = start + GRID * np.arange(len(poses))
         measured = chair.seen(effects.Reference(times, poses, np.zeros_like(poses), start, known))
         return geometry.interpolate(drive.start + (measured.times - start), measured.poses, drive.times)

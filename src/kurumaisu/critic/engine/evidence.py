@@ -27,7 +27,7 @@ from kurumaisu.critic.engine.catalogue import (
     showing,
 )
 from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
-from kurumaisu.critic.engine.form_error import SHARES, form_errors
+from kurumaisu.critic.engine.form_error import SHARES, form_errors, smooth_functions
 from kurumaisu.critic.engine.step_likelihood import StartValues, Walked
 from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
 from kurumaisu.critic.values.policy import Z_USUAL, in_proportion, log_prior, occam, occam_plane
@@ -128,6 +128,7 @@ class Problem:
         self._terms = terms
         self.ids = ids
         self._known = known or replay.Increments(model)
+        self._smooth: dict[int, tuple[Drive, FloatArray]] = {}
         self._whiteners: dict[int, tuple[Drive, Whitener, Covariance]] = {}
         self._walked: Walked = {}
 
@@ -214,6 +215,12 @@ class Problem:
             self._whiteners[id(drive)] = drive, white, Covariance(white.whiten(nuisance))
         _, white, lasting = self._whiteners[id(drive)]
         return lasting.whiten(white.whiten(columns))
+
+    def smooth(self, drive: Drive) -> FloatArray:
+        """Return the functions of one of the drives over which forms may differ, (m, k)."""
+        if id(drive) not in self._smooth:
+            self._smooth[id(drive)] = drive, smooth_functions(drive)
+        return self._smooth[id(drive)][1]
 
     def fit(self, ids: Iterable[str], start: Mapping[Key, float]) -> Fit:
         """Return the nonlinear fit of a set of effects with all their parameters; start: a first guess by term."""

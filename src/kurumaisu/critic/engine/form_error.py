@@ -67,7 +67,7 @@ def _marks(problem: Problem, drive: Drive, terms: Sequence[Term], values: FloatA
     null = np.array([term.null for term in terms])
     here = problem.simulated(drive, settings_of(terms, values))
     signal = here - problem.simulated(drive, settings_of(terms, np.where(own, null, values)))
-    smooth = smooth_functions(drive)
+    smooth = problem.smooth(drive)
     whole = [signal.reshape(-1, 1)]
     for axes in ((True, True, False), (False, False, True)):
         part = np.where(axes, signal, 0.0)
