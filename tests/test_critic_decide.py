@@ -155,7 +155,10 @@ def test_a_search_ends_where_ever_more_sets_would_be_fitted(monkeypatch):
     problem = Problem([prepare(run, MODEL) for run in runs], MODEL, START, ids=frozenset(GAINS))
     assert search(problem, lambda _: None).best.ids == set(GAINS)
     monkeypatch.setattr("kurumaisu.critic.search.search._MOST", 2)
+    monkeypatch.setattr("kurumaisu.critic.search.search._AGAIN", 0)
     monkeypatch.setattr("kurumaisu.critic.search.search.nearly_same_rates", lambda *_: True)  # no second look
     fitted = []
     assert len(search(problem, fitted.append).best.ids) == 1
-    assert len(fitted) == 3
+    assert [said.partition(":")[0] for said in fitted] == [
+        f"fitting set {k} at most" for k in ("1 of 2", "2 of 2", "3 of 3")
+    ]

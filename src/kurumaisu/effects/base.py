@@ -152,7 +152,10 @@ class VoltageEffect(BaseEffect, ABC):
 
 
 class ReferenceEffect(BaseEffect, ABC):
-    """An effect on what is measured of the motion; it has no state. of_times: it moves the times of what is measured."""
+    """An effect on what is measured of the motion; it has no state.
+
+    of_times: it moves the times of what is measured.
+    """
 
     stage = Stage.REFERENCE
     of_times: ClassVar[bool] = False

@@ -38,7 +38,8 @@ _SWAPPED = 4  # and in the place of each of its effects
 _ASKED = 20.0  # [nat] behind the best set from which on no curve is asked for beside one
 _HOPELESS = 10.0  # [nat] that a proposal may promise less than the best set has
 _ROUNDS = 8
-_MOST = 80  # sets fitted in these, after which no more is gone on from: where nothing explains all, many come near
+_MOST = 80  # sets fitted, after which no more is gone on from: where nothing explains all, many come near
+_AGAIN = 20  # sets fitted in a second look, at least, before that
 _CLOSER = 4  # sets beside which curves of other kinds are tried
 _LARGEST = 6  # effects in a set
 _STEP_COST = 4.0  # [nat] of a size that may be any of many
@@ -256,7 +257,7 @@ class _Search:
                     self.curves.closer(rest)
 
     def _go_on(self) -> None:
-        self._until = len(self.fits) + _MOST
+        self._until = max(_MOST, len(self.fits) + _AGAIN)
         for _ in range(self._rounds):
             ranked = sorted(self.fits.values(), key=self.score, reverse=True)
             best = self.score(ranked[0])
