@@ -159,6 +159,5 @@ def test_a_search_ends_where_ever_more_sets_would_be_fitted(monkeypatch):
     monkeypatch.setattr("kurumaisu.critic.search.search.nearly_same_rates", lambda *_: True)  # no second look
     fitted = []
     assert len(search(problem, fitted.append).best.ids) == 1
-    assert [said.partition(":")[0] for said in fitted] == [
-        f"fitting set {k} at most" for k in ("1 of 2", "2 of 2", "3 of 3")
-    ]
+    told = [said.partition(",")[0] for said in fitted]
+    assert told == [f"fitting set {k + 1} of at most {most}" for k, most in enumerate((2, 2, 3))]

@@ -232,8 +232,7 @@ class _Search:
         done = len(self.fits)
         most = max(self._until, done + 1)
         left = (most - done) * (time.monotonic() - self._began) / max(done, 1)
-        more = f", {left:.0f} s more at most" if done >= _FIRST else ""
-        self._progress(f"fitting set {done + 1} of {most} at most{more}: {what}")
+        self._progress(f"fitting set {done + 1} of at most {most}, some {left:.0f} s to go: {what}")
 
     def run(self, first: Sequence[Fit]) -> None:
         """Go on from the best sets until none of them proposes anything."""
