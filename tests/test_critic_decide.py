@@ -160,4 +160,4 @@ def test_a_search_ends_where_ever_more_sets_would_be_fitted(monkeypatch):
     fitted = []
     assert len(search(problem, fitted.append).best.ids) == 1
     told = [said.partition(",")[0] for said in fitted]
-    assert told == [f"fitting set {k + 1} of at most {most}" for k, most in enumerate((2, 2, 3))]
+    assert told == [f"fitting set {k + 1} of at most {most}" for k, most in enumerate((2, 2))]

@@ -304,7 +304,8 @@ class _Search:
         return max(map(self.bare, self.fits.values()))
 
     def _with(self, fit: Fit, guess: Guess) -> None:
-        self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
+        if len(self.fits) < self._until:
+            self.fit(fit.candidates | {guess.candidate}, {**fit.start, **guess.start})
 
     def _proposals(self, fit: Fit, *, steps: bool) -> list[Guess]:
         """Return what may act beside a fit, best first; what may act beside its best curve besides, comes behind."""
