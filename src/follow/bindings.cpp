@@ -53,7 +53,8 @@ void bindFollow(py::module_& m) {
         "second,\n"
         "from a level on; and the level reached.");
   m.def("lag", &lag, py::arg("targets"), py::arg("tau"), py::arg("dt"), py::arg("level"),
-        "Means (n,) over steps of dt [s] of a first-order lag of tau [s] behind targets (n,), from a level on; and\n"
+        "Means (n,) over steps of dt [s] of a first-order lag of tau [s] behind targets (n,), from a level "
+        "on; and\n"
         "the level reached.");
   m.def(
       "play", &play, py::arg("inputs"), py::arg("half"), py::arg("level"),

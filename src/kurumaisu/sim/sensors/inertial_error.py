@@ -29,17 +29,6 @@ class InertialErrorSettings:
     scale: float
     limit: float
 
-    def allan_variance(self, times: FloatArray) -> FloatArray:
-        """Return the Allan variance [u^2] at averaging times [s]: IEEE Std 952-1997, annex C.
-
-        It is what readings taken in steps much shorter than the times show.
-        """
-        t, tc = times, self.correlation_time
-        white = self.noise_density**2 / t
-        walk = self.random_walk**2 * t / 3
-        shape = 1 - tc / (2 * t) * (3 - 4 * np.exp(-t / tc) + np.exp(-2 * t / tc))
-        return np.asarray(white + walk + 2 * self.instability**2 * tc / t * shape, dtype=np.float64)
-
 
 class InertialError:
     """The errors of several axes, each with a bias of its own."""
