@@ -141,6 +141,8 @@ def test_ramp_against_the_differential_equation():
     [
         (lambda: _core.ramp(V, -1.0, DT, 0.0), "slowness must not be negative"),
         (lambda: _core.ramp(V, 1.0, 0.0, 0.0), "dt must be positive"),
+        (lambda: _core.lag(V, 0.0, DT, 0.0), "tau and dt must be positive"),
+        (lambda: _core.lag(V, 1.0, 0.0, 0.0), "tau and dt must be positive"),
         (lambda: _core.play(V, -0.1, 0.0), "half must not be negative"),
         (lambda: _core.play(np.zeros((2, 2)), 0.1, 0.0), r"inputs must have shape \(n,\)"),
     ],

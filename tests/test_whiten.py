@@ -116,6 +116,15 @@ def test_against_the_joint_covariance(slow, activity, rolling, count, lasting):
     assert log_determinants.sum() == pytest.approx(np.linalg.slogdet(cov)[1], abs=1e-4)
 
 
+@pytest.mark.parametrize("count", [7, 8, 9, 21])  # increments, of which products are summed several at a time
+def test_products_of_a_longer_drive_are_those_of_its_columns(count):
+    times, poses = run(count, 1)
+    columns = np.random.default_rng(2).normal(size=(3 * count, 11))
+    whitener = Whitener(poses, times, np.ones(count), np.ones(count), arcs(poses), **NOISE)
+    white = whitener.whiten(columns)
+    np.testing.assert_allclose(whitener.gram(columns), white.T @ white, rtol=1e-10, atol=1e-10)
+
+
 def test_short_steps_do_not_cancel():
     times = np.arange(50) * 1e-4
     poses = np.zeros((50, 3))

@@ -3,7 +3,6 @@
 #include "bindings.h"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "follow/follow.h"
@@ -25,15 +24,14 @@ py::tuple ramp(const Array& targets, double slowness, double dt, double level) {
   if (!(slowness >= 0) || !(dt > 0)) {
     throw std::invalid_argument("slowness must not be negative and dt must be positive");
   }
-  Ramp it(slowness, level);
+  RateLimiter it(slowness, level);
   const Array means = along(targets, [&](double target) { return it.step(target, dt); });
   return py::make_tuple(means, it.level());
 }
 
 py::tuple lag(const Array& targets, double tau, double dt, double level) {
   if (!(tau > 0) || !(dt > 0)) throw std::invalid_argument("tau and dt must be positive");
-  const double decay = std::exp(-dt / tau);
-  Lag it(decay, tau / dt * (1 - decay), level);
+  Lag it(tau, dt, level);
   const Array means = along(targets, [&](double target) { return it.step(target); });
   return py::make_tuple(means, it.level());
 }

@@ -6,7 +6,7 @@
 
 namespace kurumaisu {
 
-double Ramp::step(double target, double dt) {
+double RateLimiter::step(double target, double dt) {
   const double gap = target - level_;
   const double needed = slowness_ * std::fabs(gap);
   if (needed <= dt) {
@@ -17,6 +17,9 @@ double Ramp::step(double target, double dt) {
   level_ += gained;
   return level_ - gained / 2;
 }
+
+Lag::Lag(double tau, double dt, double level)
+    : decay_(std::exp(-dt / tau)), mean_(tau / dt * (1 - decay_)), level_(level) {}
 
 double Play::step(double input) {
   level_ = std::min(std::max(level_, input - half_), input + half_);

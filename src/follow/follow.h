@@ -5,10 +5,10 @@
 namespace kurumaisu {
 
 /// Output that runs after its target no faster than a slope allows, exact for targets held over a step.
-class Ramp {
+class RateLimiter {
  public:
   /// slowness: time [s] that a change by 1 takes; 0: none.
-  Ramp(double slowness, double level) : slowness_(slowness), level_(level) {}
+  RateLimiter(double slowness, double level) : slowness_(slowness), level_(level) {}
 
   /// Mean of the output over a step of dt [s] with this target.
   double step(double target, double dt);
@@ -24,8 +24,8 @@ class Ramp {
 /// First-order lag, exact for targets held over a step.
 class Lag {
  public:
-  /// decay: share of a difference that is left after a step; mean: share of it that there is in the step on the mean.
-  Lag(double decay, double mean, double level) : decay_(decay), mean_(mean), level_(level) {}
+  /// Time constant tau [s], steps of dt [s].
+  Lag(double tau, double dt, double level);
 
   /// Mean of the output over a step with this target.
   double step(double target) {
@@ -37,8 +37,8 @@ class Lag {
   double level() const { return level_; }
 
  private:
-  double decay_;
-  double mean_;
+  double decay_;  ///< share of a difference that is left after a step
+  double mean_;   ///< share of it that there is in the step on the mean
   double level_;
 };
 

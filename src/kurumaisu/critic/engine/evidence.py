@@ -28,9 +28,10 @@ from kurumaisu.critic.engine.catalogue import (
 )
 from kurumaisu.critic.engine.covariance import Covariance, orthonormal, without
 from kurumaisu.critic.engine.form_error import SHARES, form_errors, smooth_functions
+from kurumaisu.critic.engine.set_cost import alike, proportion, step_cost
 from kurumaisu.critic.engine.step_likelihood import StartValues, Walked
 from kurumaisu.critic.noise.base_noise import Noise, turned, whitener
-from kurumaisu.critic.values.policy import Z_USUAL, in_proportion, log_prior, occam, occam_plane
+from kurumaisu.critic.values.policy import Z_USUAL, log_prior, occam, occam_plane
 from kurumaisu.params import EffectSetting, Model
 from kurumaisu.types import FloatArray
 
@@ -39,7 +40,6 @@ _ROUGH_WAYS = float(np.log(16))  # [nat] for having been tried over its whole ra
 _ROUGH_DERIVATIVE = 1e-4  # the same of what has many likely values: right between its peaks
 _AT_WILL = float(np.log(2.0))  # [nat] of a size beyond some, which every other one is
 _LARGER = 0.5  # by this share such sizes are made larger, to see it
-_ROUGH_RANGE = float(np.log(np.log(100.0)))  # [nat] a size may lie anywhere within two decades, on a log scale
 
 
 @dataclass(frozen=True)
@@ -290,15 +290,15 @@ class Problem:
             cost += sum(float(np.log(np.hypot(1.0, scale))) for scale in scales)
             size = self._amplitudes(terms, solution, loud)
             ways = _ROUGH_WAYS if candidate.rough else 0.0
-            size -= 0.0 if effects.by_id(candidate.id).separable else _proportion(terms, solution, loud)
-            cost += max(ways + size, _step_cost(terms, solution, loud))
+            size -= 0.0 if effects.by_id(candidate.id).separable else proportion(terms, solution, loud)
+            cost += max(ways + size, step_cost(terms, solution, loud))
         if len(free) > 1:
-            cost += _alike(solution.slopes[:, free])
+            cost += alike(solution.slopes[:, free])
             # Less what an effect with two amplitudes has by itself: z counts it.
             total = 0.0
             for candidate in chosen:
                 own = [i for i in free if terms[i].id == candidate.id]
-                total += _alike(solution.slopes[:, own]) if len(own) > 1 else 0.0
+                total += alike(solution.slopes[:, own]) if len(own) > 1 else 0.0
             cost -= total
         return cost
 
@@ -357,47 +357,3 @@ class Problem:
     def _whitened(self, drive: Drive, settings: tuple[EffectSetting, ...]) -> FloatArray:
         residual = drive.measured - self.simulated(drive, settings)
         return self.whitened(drive, residual.reshape(-1, 1))[:, 0]
-
-
-def _alike(slopes: FloatArray) -> float:
-    """Return half the log determinant of how slopes (rows, k) correlate."""
-    unit = slopes / np.maximum(np.linalg.norm(slopes, axis=0), 1e-9)
-    return 0.5 * float(np.linalg.slogdet(unit.T @ unit + np.eye(slopes.shape[1]) / Z_USUAL**2)[1])
-
-
-def _proportion(terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
-    """Return what two amplitudes of one cause cost less for being in their usual proportion, in nats.
-
-    Of a quantity that has a direction, such as a slope, either sign of both is possible, and every direction as likely.
-    """
-    bounds = [(terms[i].parameter.lower, terms[i].parameter.upper) for i in loud]
-    natural = [terms[i].null in ends for i, ends in zip(loud, bounds, strict=True)]
-    if len(loud) != 2 or not any(natural):
-        return 0.0
-    order = sorted(range(2), key=lambda k: natural[k])  # the second has one sign only
-    use = [loud[k] for k in order]
-    free = [i for i, term in enumerate(terms) if not term.fixed]
-    step = np.array([terms[i].step for i in free])
-    tight = np.array([terms[i].step if terms[i].shape else 0.0 for i in free])
-    slopes = solution.slopes[:, free]
-    inside = [free.index(i) for i in use]
-    whole = slopes.T @ slopes + np.diag(np.square(tight).astype(np.float64))
-    spread = least_squares.covariance(whole)[np.ix_(inside, inside)]
-    spread = spread * np.outer(step[inside], step[inside])
-    own = slopes[:, inside] / step[inside]
-    sizes = np.array([(solution.values[i] - terms[i].null) / terms[i].parameter.scale for i in use])
-    return in_proportion(sizes, spread, own.T @ own)
-
-
-def _step_cost(terms: Sequence[Term], solution: least_squares.Solution, loud: Sequence[int]) -> float:
-    """Return the cost of sizes that the data know so closely: by chance, one out of many would fit as well.
-
-    A threshold that is met by little, too: it could be anywhere, and is where the drives just reach it.
-    """
-    many = [i for i in loud if terms[i].rough or terms[i].sudden]
-    if not many:
-        return -np.inf
-    sizes = [abs(solution.values[i] - terms[i].null) for i in many]
-    sds = [solution.sds[i] for i in many]
-    width = np.sqrt(2 * np.pi) * np.array(sds) / np.maximum(sizes, 1e-12)
-    return float(np.sum(_ROUGH_RANGE - np.log(np.clip(width, 1e-6, 1.0))))
